@@ -1,0 +1,1 @@
+"""The replay bundle and the types that cross stages, with their files."""

@@ -1,0 +1,94 @@
+"""Folders and files that are whole or absent: written under a temporary name, renamed at the end."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from slamreplay.errors import OutputError
+
+
+@contextmanager
+def atomic_folder(target: Path, *, marker: str) -> Iterator[Path]:
+    """A temporary folder that becomes `target` when the block ends, and vanishes if it fails.
+
+    Args:
+        target: the folder to be; one of ours is replaced in one step.
+        marker: the file by which a folder of ours is known; an existing folder without it, unless
+            it is empty, is refused.
+
+    Raises:
+        OutputError: `target` is somebody else's, or cannot be written.
+    """
+    refuse_foreign(target, marker)
+    made: list[Path] = []
+    try:
+        for parent in reversed([p for p in target.parents if not p.exists()]):
+            parent.mkdir()
+            made.append(parent)
+        work = Path(tempfile.mkdtemp(prefix=f".{target.name}.", dir=target.parent))
+    except OSError as error:
+        _remove_empty(made)
+        raise _cannot_write(target, error) from error
+    try:
+        work.chmod(0o755)
+        yield work
+        old = work.with_name(work.name + ".old")
+        if target.exists():
+            target.rename(old)
+        work.rename(target)
+        shutil.rmtree(old, ignore_errors=True)
+    except BaseException as error:
+        shutil.rmtree(work, ignore_errors=True)
+        _remove_empty(made)
+        if isinstance(error, OSError):
+            raise _cannot_write(target, error) from error
+        raise
+
+
+def refuse_foreign(target: Path, marker: str) -> None:
+    """Raise OutputError where `target` exists and is not an empty folder or one with `marker`."""
+    if not (target.exists() or target.is_symlink()):
+        return
+    try:
+        ours = target.is_dir() and ((target / marker).exists() or not any(target.iterdir()))
+    except OSError as error:
+        raise _cannot_write(target, error) from error
+    if not ours:
+        raise OutputError(
+            f"exists and holds no {marker}", where=target, hint="name another output with -o"
+        )
+
+
+def write_file(target: Path, content: bytes) -> None:
+    """Write one file so that it is whole or absent.
+
+    Raises:
+        OutputError: the place cannot be written.
+    """
+    try:
+        handle, name = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
+        try:
+            with os.fdopen(handle, "wb") as stream:
+                stream.write(content)
+            Path(name).chmod(0o644)
+            Path(name).replace(target)
+        except BaseException:
+            Path(name).unlink(missing_ok=True)
+            raise
+    except OSError as error:
+        raise _cannot_write(target, error) from error
+
+
+def _remove_empty(folders: list[Path]) -> None:
+    for folder in reversed(folders):
+        if not any(folder.iterdir()):
+            folder.rmdir()
+
+
+def _cannot_write(target: Path, error: OSError) -> OutputError:
+    return OutputError(f"cannot write: {error.strerror or error}", where=target)

@@ -1,0 +1,133 @@
+"""A check's answer, and the catalogue of what findings mean."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+Severity = Literal["info", "warning", "error"]
+SEVERITIES: tuple[Severity, ...] = ("info", "warning", "error")
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One answer with its numbers; unknown numbers are None.
+
+    Attributes:
+        id: stable id; `FINDINGS` holds its title and meaning.
+        severity: info, warning or error.
+        message: one sentence with the numbers in it.
+        start_ns: first moment it holds for, on the bundle's clock.
+        end_ns: last moment.
+        value: the number that was judged, with `low` and `high` the interval it was judged by.
+        unit: unit of these numbers.
+        n: samples.
+        n_eff: effective samples, after autocorrelation.
+    """
+
+    id: str
+    severity: Severity
+    message: str
+    start_ns: int | None = None
+    end_ns: int | None = None
+    value: float | None = None
+    low: float | None = None
+    high: float | None = None
+    unit: str = ""
+    n: int | None = None
+    n_eff: float | None = None
+
+    @property
+    def title(self) -> str:
+        """The short name of what was found."""
+        return FINDINGS[self.id].title
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """What a finding asks, how it is computed, and when it misleads: `slamreplay explain ID`."""
+
+    title: str
+    asks: str
+    method: str
+    misleads: str
+
+
+FINDINGS: dict[str, Explanation] = {
+    "SR-LOC-001": Explanation(
+        "The robot was lost",
+        "Was the belief farther from where the robot really was than the limit, for long enough?",
+        "Belief minus hindsight at every scan; more than 0.5 m or 20 deg for 3 s or longer.",
+        "Where hindsight itself is wrong: look at its coverage and at the observability margin.",
+    ),
+    "SR-LOC-002": Explanation(
+        "More than one place explains the log",
+        "Does a different place in the map explain all scans as well as the best one?",
+        "Score of the best sequence of places against the best different one, per scan.",
+        "A symmetric building is honestly ambiguous; a short log may be so without symmetry.",
+    ),
+    "SR-LOC-003": Explanation(
+        "No belief to judge",
+        "Did a localizer publish map->odom or a pose?",
+        "Neither a transform between the map and odometry frames nor a pose topic was recorded.",
+        "Recorded under an unusual type or name: give the topic in a topics file.",
+    ),
+    "SR-MAP-001": Explanation(
+        "The aisle had changed",
+        "Do beams, cast from where the robot really was, contradict the map and stay that way?",
+        "Changed beams over valid beams: more than 8 % for 2 s or longer; people do not count.",
+        "Hindsight off by more than 0.25 m makes walls look moved; glass and mirrors do so always.",
+    ),
+    "SR-MAP-002": Explanation(
+        "No map to judge against",
+        "Is there a map in the log or on the command line?",
+        "No occupancy grid topic and no --map.",
+        "A map that was recorded before the log was cut: give it with --map.",
+    ),
+    "SR-MAP-FRAME": Explanation(
+        "The map's frame is shifted",
+        "Is the belief off by one constant transform over the whole log?",
+        "Spread of belief against hindsight: constant offset, self-consistent belief.",
+        "A wrong start that was never corrected looks the same; both are then named.",
+    ),
+    "SR-MAP-WRONG": Explanation(
+        "The map is of another place",
+        "Do the scans fit anywhere in the map?",
+        "The best sequence of places explains too few beams.",
+        "A building that was rebuilt altogether.",
+    ),
+    "SR-CON-001": Explanation(
+        "The covariance does not match the error",
+        "Is the normalised estimation error squared what a consistent estimator would show?",
+        "NEES e' (P + P_ref)^-1 e per row, e = belief minus reference in x, y and wrapped yaw; its "
+        "mean against the chi-square interval for the effective number of samples (Bar-Shalom, "
+        "Li, Kirubarajan 2001, section 5.4).",
+        "A reference that shares evidence with the belief, as hindsight does, can show "
+        "over-confidence and never proves consistency. AMCL's mean and covariance may come from "
+        "different clusters.",
+    ),
+    "SR-CON-002": Explanation(
+        "Covariances that are none",
+        "Are the published covariances finite, symmetric and positive definite?",
+        "Rows whose x y yaw block fails the test, counted; they are left out of NEES.",
+        "Some localizers publish zero covariance on purpose until they are initialised.",
+    ),
+    "SR-CLK-001": Explanation(
+        "Clocks disagree",
+        "Do header stamps and log times tell the same story?",
+        "Median offset of log time minus header stamp, and its drift over the log.",
+        "Simulated time is meant to differ; replayed bags carry the old stamps.",
+    ),
+    "SR-DAT-001": Explanation(
+        "Parts of the replay bundle are missing",
+        "Are all eight parts there: odometry, IMU, scans, pose, covariance, map, costmap, recovery?",
+        "Roles that no topic could play.",
+        "Hidden topics (actions) are recorded only on request: absence of a topic proves nothing.",
+    ),
+    "SR-DAT-002": Explanation(
+        "Data was lost or mended while reading",
+        "Was everything in the log readable?",
+        "Counts by reason, from the manifest.",
+        "Repairs are harmless more often than not; losses may hide the moment in question.",
+    ),
+}

@@ -1,0 +1,78 @@
+"""What hindsight hands on: where the robot really was, and what of the map was not true."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from slamreplay.bundle.track import PoseTrack
+from slamreplay.geometry import se2
+
+
+@dataclass(frozen=True)
+class ChangedRegion:
+    """A connected patch of the map that the log contradicts.
+
+    Attributes:
+        kind: appeared (mapped free, stands there), removed (mapped wall, gone) or moved.
+        bbox_m: x_min, y_min, x_max, y_max in the map frame; of a moved region the new place.
+        from_bbox_m: the old place of a moved region.
+    """
+
+    kind: Literal["appeared", "removed", "moved"]
+    bbox_m: tuple[float, float, float, float]
+    area_m2: float
+    first_seen_ns: int
+    last_seen_ns: int
+    views: int
+    confidence: float
+    from_bbox_m: tuple[float, float, float, float] | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Changes:
+    """Changed cells and beams.
+
+    Attributes:
+        appeared: (H, W) cells mapped free or unknown where something stands.
+        removed: (H, W) mapped walls that are gone.
+        regions: connected patches of both.
+        t_ns: (N,) scan times.
+        changed_share: (N,) changed beams over valid beams of each scan, NaN where none is valid.
+        appeared_share: (N,) of it, nearer than the map says.
+        removed_share: (N,) of it, beyond a mapped wall.
+    """
+
+    appeared: NDArray[np.bool_]
+    removed: NDArray[np.bool_]
+    regions: tuple[ChangedRegion, ...]
+    t_ns: NDArray[np.int64]
+    changed_share: se2.Array
+    appeared_share: se2.Array
+    removed_share: se2.Array
+
+
+@dataclass(frozen=True, eq=False)
+class Hindsight:
+    """The trajectory rebuilt from the whole log, and how far it can be trusted.
+
+    Attributes:
+        track: base in map, one row per scan; NaN rows where the log does not tell.
+        sigma_m: typical (median) standard deviation of position.
+        coverage: share of scans with a pose.
+        match: (N,) mean likelihood-field score of each scan at its pose, 0 to 1; it says how well
+            the map explains the scan, changes included.
+        margin: by how much the best sequence of places beats the best different one, in mean score
+            per scan; None where no different one was found.
+        changes: what contradicts the map, seen from this trajectory.
+    """
+
+    track: PoseTrack
+    sigma_m: float
+    coverage: float
+    match: se2.Array
+    margin: float | None
+    changes: Changes | None

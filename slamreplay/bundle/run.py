@@ -1,0 +1,144 @@
+"""A trial, what an estimator produced in it, and their files."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from slamreplay.bundle.track import PoseTrack
+from slamreplay.errors import BundleError
+from slamreplay.geometry.se2 import Array
+
+RUN_FORMAT = 1
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A bundle, an estimator, a seed, and at most one perturbation: the type holds no second one.
+
+    Attributes:
+        bundle_id: which evidence.
+        estimator: name in the estimator registry.
+        seed: of every random number in the trial.
+        perturbation: `NAME.VARIANT`, or None for the baseline.
+        level: the perturbation's one number, in `unit`; None for the baseline.
+        unit: s, m, deg or ratio.
+    """
+
+    bundle_id: str
+    estimator: str
+    seed: int
+    perturbation: str | None = None
+    level: float | None = None
+    unit: str = ""
+
+    @property
+    def id(self) -> str:
+        """Short hash that names the trial's files."""
+        return hashlib.sha256(json.dumps(asdict(self)).encode()).hexdigest()[:16]
+
+
+@dataclass(frozen=True, eq=False)
+class Innovations:
+    """What each measurement said against the prediction, one source per set.
+
+    Attributes:
+        source: table or sensor.
+        t_ns: (N,) times.
+        residual: (N, m) measured minus predicted.
+        S: (N, m, m) covariance predicted for it, from the prior.
+        accepted: (N,) whether the update used it.
+    """
+
+    source: str
+    t_ns: NDArray[np.int64]
+    residual: Array
+    S: Array
+    accepted: NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class Estimate:
+    """What an estimator gives back.
+
+    Attributes:
+        track: belief, one row per scan in processing order (odometry rows where no scan is).
+        innovations: by source, where the estimator has them.
+        diagnostics: further columns (N,) by name: particles, effective sample size, updates.
+    """
+
+    track: PoseTrack
+    innovations: tuple[Innovations, ...] = ()
+    diagnostics: Mapping[str, Array] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """An estimate and the trial it came from; `not_applicable` says why there is no estimate."""
+
+    trial: Trial
+    estimate: Estimate | None
+    not_applicable: str | None = None
+
+
+def run_bytes(run: Run) -> bytes:
+    """The run as one uncompressed npz with a json header: same run, same bytes."""
+    arrays: dict[str, NDArray] = {}
+    head: dict[str, object] = {
+        "run_format": RUN_FORMAT,
+        "trial": asdict(run.trial),
+        "not_applicable": run.not_applicable,
+    }
+    if run.estimate is not None:
+        track = run.estimate.track
+        head["frames"] = [track.frame_id, track.child_frame_id]
+        arrays |= {"t_ns": track.t_ns, "xyyaw": track.xyyaw, "cov": track.cov}
+        head["innovations"] = [i.source for i in run.estimate.innovations]
+        for k, i in enumerate(run.estimate.innovations):
+            arrays |= {f"innovation{k}.{n}": getattr(i, n) for n in _INNOVATION}
+        arrays |= {f"diagnostic.{k}": v for k, v in sorted(run.estimate.diagnostics.items())}
+    text = json.dumps(head, sort_keys=True).encode()
+    arrays["head"] = np.frombuffer(text, dtype=np.uint8)
+    sink = io.BytesIO()
+    np.savez(sink, allow_pickle=False, **arrays)  # zip entries carry a fixed date: deterministic
+    return sink.getvalue()
+
+
+def read_run(path: Path) -> Run:
+    """A run from its file.
+
+    Raises:
+        BundleError: unreadable, or written by another version.
+    """
+    try:
+        with np.load(path, allow_pickle=False) as arrays:
+            head = json.loads(arrays["head"].tobytes())
+            if head["run_format"] != RUN_FORMAT:
+                raise BundleError(f"run format {head['run_format']}", where=path)
+            trial = Trial(**head["trial"])
+            if "frames" not in head:
+                return Run(trial, None, head["not_applicable"])
+            frame, child = head["frames"]
+            track = PoseTrack(frame, child, arrays["t_ns"], arrays["xyyaw"], arrays["cov"])
+            innovations = tuple(
+                Innovations(source, *(arrays[f"innovation{k}.{n}"] for n in _INNOVATION))
+                for k, source in enumerate(head["innovations"])
+            )
+            diagnostics = {
+                name.removeprefix("diagnostic."): arrays[name]
+                for name in arrays.files
+                if name.startswith("diagnostic.")
+            }
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise BundleError("not a readable run", where=path) from error
+    return Run(trial, Estimate(track, innovations, diagnostics), head["not_applicable"])
+
+
+_INNOVATION = ("t_ns", "residual", "S", "accepted")

@@ -1,0 +1,113 @@
+"""Scans as geometry: which beams say something, and where their ends lie about the base."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from slamreplay.bundle.odometry import odometry_track
+from slamreplay.bundle.track import PoseTrack
+from slamreplay.bundle.view import BundleView
+from slamreplay.geometry import se2, se3
+
+
+@dataclass(frozen=True, eq=False)
+class ScanSet:
+    """All scans of the chosen laser, in time order.
+
+    Attributes:
+        t_ns: (N,) stamp of the first beam, on the bundle's clock.
+        ranges_m: (N, B) float32 as recorded; NaN pads shorter scans.
+        angle_min: (N,) bearing of the first beam about the base's z axis in the laser frame, rad.
+            Of a laser that is mounted upside down the bearings are mirrored already.
+        angle_increment: (N,) rad between beams, signed.
+        time_increment_s: (N,) s between beams.
+        hits: (N, B) beams with a return inside [range_min, range_max].
+        misses: (N, B) beams that saw free space to the end: +inf (REP-117).
+        range_max_m: (N,) m.
+        xyyaw_base_laser: (3,) the laser's pose on the robot.
+        odometry: the motion during a scan, for deskewing; None leaves scans as they are.
+    """
+
+    t_ns: NDArray[np.int64]
+    ranges_m: NDArray[np.float32]
+    angle_min: se2.Array
+    angle_increment: se2.Array
+    time_increment_s: se2.Array
+    hits: NDArray[np.bool_]
+    misses: NDArray[np.bool_]
+    range_max_m: se2.Array
+    xyyaw_base_laser: se2.Array
+    odometry: PoseTrack | None
+
+    def __len__(self) -> int:
+        return len(self.t_ns)
+
+    def bearings(self, scan: int) -> se2.Array:
+        """(B,) angles of the beams in the laser frame, rad."""
+        beams = np.arange(self.ranges_m.shape[1])
+        return np.asarray(self.angle_min[scan] + beams * self.angle_increment[scan])
+
+    def points(self, scan: int) -> se2.Array:
+        """(M, 2) ends of the beams that hit, in the base frame at the scan's stamp, deskewed."""
+        hit = self.hits[scan]
+        reach = self.ranges_m[scan, hit].astype(np.float64)
+        bearing = self.bearings(scan)[hit]
+        ends = np.column_stack([reach * np.cos(bearing), reach * np.sin(bearing)])
+        ends = se2.transform_points(self.xyyaw_base_laser, ends)
+        if self.time_increment_s[scan] <= 0.0 or self.odometry is None or not len(ends):
+            return ends
+        late_ns = np.flatnonzero(hit) * (self.time_increment_s[scan] * 1e9)
+        times = self.t_ns[scan] + np.append(0.0, late_ns).astype(np.int64)
+        poses = self.odometry.at(times).xyyaw
+        motion = se2.between(poses[:1], poses[1:])
+        motion = np.where(np.isfinite(motion), motion, 0.0)  # beyond the odometry: left as it is
+        return np.asarray(se2.transform_points(motion, ends[:, None, :])[:, 0, :])
+
+
+def scan_set(view: BundleView) -> ScanSet | None:
+    """The scans of the laser that plays the scan role, or None without one.
+
+    A laser whose frame is not in tf is taken to sit at the base's origin; `inspect` says so.
+    """
+    table = view.role("scan")
+    if table is None or not len(table):
+        return None
+    table = table.sorted_by_time()
+    ranges = table["ranges_m"]
+    n, width = len(table), int(ranges.lengths.max(initial=0))
+    matrix = np.full((n, width), np.nan, dtype=np.float32)
+    column = np.arange(len(ranges.values)) - np.repeat(ranges.offsets[:-1], ranges.lengths)
+    matrix[np.repeat(np.arange(n), ranges.lengths), column] = ranges.values
+    low, high = table["range_min_m"][:, None], table["range_max_m"][:, None]
+    with np.errstate(invalid="ignore"):
+        hits = np.isfinite(matrix) & (matrix > 0.0) & (matrix >= low) & (matrix <= high)
+    mount, upside_down = _laser_mount(view, str(table["frame_id"][0]))
+    sign = -1.0 if upside_down else 1.0
+    return ScanSet(
+        table.t_ns,
+        matrix,
+        sign * table["angle_min_rad"],
+        sign * table["angle_increment_rad"],
+        table["time_increment_s"],
+        hits,
+        np.isposinf(matrix),
+        table["range_max_m"],
+        mount,
+        odometry_track(view),
+    )
+
+
+def _laser_mount(view: BundleView, laser: str) -> tuple[se2.Array, bool]:
+    base = view.manifest.frames.base
+    if not base or not view.transforms.has_path(base, laser):
+        return np.zeros(3), False
+    moving = [e.t_ns[-1:] for e in view.transforms.path(base, laser) if not e.is_static]
+    at = np.min(moving, axis=0) if moving else np.zeros(1, dtype=np.int64)
+    T_base_laser, _ = view.transforms.lookup(base, laser, at)
+    upside_down = bool(T_base_laser[0, 2, 2] < 0.0)
+    if upside_down:  # turn it the right way up about its x axis; the bearings change their sign
+        T_base_laser = T_base_laser @ np.diag([1.0, -1.0, -1.0, 1.0])
+    return se3.planar(T_base_laser)[0], upside_down

@@ -1,0 +1,203 @@
+"""A table in memory: numpy columns under a schema, and its way to Parquet and back."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pyarrow as pa
+from numpy.typing import NDArray
+
+from slamreplay.bundle.schema import Column, TableSchema
+from slamreplay.errors import BundleError
+from slamreplay.geometry.times import NO_STAMP
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+_DTYPES: dict[str, Any] = {
+    "int64": np.int64,
+    "int32": np.int32,
+    "int8": np.int8,
+    "float64": np.float64,
+}
+_DTYPES |= {"bool": np.bool_, "list_f32": np.float32, "list_f64": np.float64, "list_i8": np.int8}
+
+
+@dataclass(frozen=True, eq=False)
+class Ragged:
+    """N sequences of different length: row i is `values[offsets[i]:offsets[i + 1]]`."""
+
+    values: NDArray[Any]
+    offsets: NDArray[np.int64]
+
+    @classmethod
+    def of(cls, rows: Iterable[Any], dtype: Any) -> Ragged:
+        """From any sequences of numbers."""
+        arrays = [np.asarray(row, dtype=dtype).ravel() for row in rows]
+        lengths = np.array([len(a) for a in arrays], dtype=np.int64)
+        values = np.concatenate(arrays) if arrays else np.empty(0, dtype=dtype)
+        return cls(values, np.concatenate([[0], np.cumsum(lengths)]))
+
+    def __len__(self) -> int:
+        return len(self.offsets) - 1
+
+    def __getitem__(self, row: int) -> NDArray[Any]:
+        return self.values[self.offsets[row] : self.offsets[row + 1]]
+
+    @property
+    def lengths(self) -> NDArray[np.int64]:
+        """(N,) entries in each row."""
+        return np.diff(self.offsets)
+
+    def take(self, index: NDArray[np.int64]) -> Ragged:
+        """The rows at `index`, in that order."""
+        lengths = self.lengths[index]
+        offsets = np.concatenate([[0], np.cumsum(lengths)])
+        entry = np.arange(offsets[-1]) - np.repeat(offsets[:-1] - self.offsets[index], lengths)
+        return Ragged(self.values[entry], offsets)
+
+
+ColumnData = NDArray[Any] | Ragged
+
+
+class Table:
+    """Columns by name, checked against a schema and read-only.
+
+    Args:
+        schema: what the columns must be.
+        columns: numpy array (N,) or (N, size), `Ragged` for lists, object array of str for text.
+
+    Raises:
+        BundleError: a column is missing, unknown, or of the wrong shape or length.
+    """
+
+    def __init__(self, schema: TableSchema, columns: Mapping[str, Any]) -> None:
+        self.schema = schema
+        names = [c.name for c in schema.columns]
+        if set(columns) != set(names):
+            odd = sorted(set(columns) ^ set(names))
+            raise BundleError(f"columns do not fit the schema: {odd}", where=schema.name)
+        self._columns = {c.name: _checked(c, columns[c.name], schema.name) for c in schema.columns}
+        lengths = {len(data) for data in self._columns.values()}
+        if len(lengths) > 1:
+            raise BundleError(
+                f"columns have different lengths {sorted(lengths)}", where=schema.name
+            )
+
+    @classmethod
+    def empty(cls, schema: TableSchema) -> Table:
+        """A table without rows."""
+        return cls(schema, {c.name: [] for c in schema.columns})
+
+    def __len__(self) -> int:
+        return len(self._columns["t_ns"])
+
+    def __getitem__(self, name: str) -> Any:
+        """The column as numpy array or `Ragged`."""
+        return self._columns[name]
+
+    @property
+    def t_ns(self) -> NDArray[np.int64]:
+        """(N,) times on the bundle's clock."""
+        return np.asarray(self._columns["t_ns"])
+
+    def take(self, index: Any) -> Table:
+        """The rows at an index array, or where a mask (N,) is true."""
+        index = np.asarray(index)
+        index = np.flatnonzero(index) if index.dtype == bool else index.astype(np.int64)
+        return Table(
+            self.schema,
+            {
+                name: data.take(index) if isinstance(data, Ragged) else data[index]
+                for name, data in self._columns.items()
+            },
+        )
+
+    def replace(self, **columns: Any) -> Table:
+        """A copy with some columns exchanged."""
+        return Table(self.schema, {**self._columns, **columns})
+
+    def sorted_by_time(self) -> Table:
+        """Rows ordered by `t_ns`, then by log time; equal rows keep their order."""
+        return self.take(np.lexsort((self["t_log_ns"], self.t_ns)))
+
+    def to_arrow(self) -> pa.Table:
+        """The Parquet form."""
+        arrays = [_to_arrow(c, self._columns[c.name]) for c in self.schema.columns]
+        return pa.Table.from_arrays(arrays, schema=self.schema.arrow_schema)
+
+    @classmethod
+    def from_arrow(cls, schema: TableSchema, table: pa.Table) -> Table:
+        """From a Parquet file's table.
+
+        Raises:
+            BundleError: it does not have the schema's columns.
+        """
+        if set(table.column_names) != {c.name for c in schema.columns}:
+            raise BundleError("Parquet columns do not fit the schema", where=schema.name)
+        return cls(schema, {c.name: _from_arrow(c, table[c.name]) for c in schema.columns})
+
+    def to_pandas(self) -> pd.DataFrame:
+        """A DataFrame; vectors are columns of arrays."""
+        return self.to_arrow().to_pandas()
+
+    @classmethod
+    def concat(cls, schema: TableSchema, tables: Iterable[Table]) -> Table:
+        """All rows, one table after the other."""
+        parts = list(tables)
+        if not parts:
+            return cls.empty(schema)
+        whole = pa.concat_tables([t.to_arrow() for t in parts])
+        return cls.from_arrow(schema, whole)
+
+
+def _checked(column: Column, data: Any, table: str) -> ColumnData:
+    if column.kind.startswith("list_"):
+        dtype = _DTYPES[column.kind]
+        if not isinstance(data, Ragged):
+            return Ragged.of(data, dtype)
+        return Ragged(np.asarray(data.values, dtype=dtype), np.asarray(data.offsets, np.int64))
+    if column.kind == "str":
+        array = np.array(data, dtype=object)
+    else:
+        array = np.array(data, dtype=_DTYPES[column.kind])
+    if not len(array):
+        array = array.reshape((0, column.size) if column.size else (0,))
+    expected = (len(array), column.size) if column.size else (len(array),)
+    if array.shape != expected:
+        raise BundleError(
+            f"column '{column.name}' has shape {array.shape}, expected {expected}", where=table
+        )
+    array.setflags(write=False)
+    return array
+
+
+def _to_arrow(column: Column, data: ColumnData) -> pa.Array:
+    if isinstance(data, Ragged):
+        values = pa.array(data.values, type=column.arrow_type.value_type)
+        return pa.ListArray.from_arrays(pa.array(data.offsets, type=pa.int32()), values)
+    if column.size:
+        flat = pa.array(np.ascontiguousarray(data).ravel(), type=column.arrow_type.value_type)
+        return pa.FixedSizeListArray.from_arrays(flat, column.size)
+    if column.name == "t_sensor_ns":
+        return pa.array(data, type=pa.int64(), mask=data == NO_STAMP)
+    return pa.array(data, type=column.arrow_type)
+
+
+def _from_arrow(column: Column, chunked: pa.ChunkedArray) -> ColumnData:
+    array = chunked.combine_chunks()
+    if isinstance(array, pa.ChunkedArray):
+        array = pa.concat_arrays(array.chunks) if array.num_chunks else pa.array([], array.type)
+    if column.kind.startswith("list_"):
+        offsets = np.asarray(array.offsets, dtype=np.int64)
+        values = array.values.slice(offsets[0], offsets[-1] - offsets[0])
+        return Ragged(values.to_numpy(zero_copy_only=False), offsets - offsets[0])
+    if column.size:
+        flat = array.flatten().to_numpy(zero_copy_only=False)
+        return np.asarray(flat).reshape((-1, column.size))
+    if column.name == "t_sensor_ns":
+        return np.asarray(array.fill_null(NO_STAMP).to_numpy(zero_copy_only=False))
+    return np.asarray(array.to_numpy(zero_copy_only=False))

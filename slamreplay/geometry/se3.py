@@ -1,0 +1,93 @@
+"""Rigid transforms in space: quaternions at the border, (N, 4, 4) matrices inside."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from slamreplay.geometry.se2 import Array, wrap_angle
+
+#: Drivers that round to float32 stay within this; beyond it a quaternion was never normalised.
+UNIT_TOLERANCE = 1e-2
+
+
+def unit_quaternion(
+    quaternion_xyzw: ArrayLike, tolerance: float = UNIT_TOLERANCE
+) -> tuple[Array, NDArray[np.bool_]]:
+    """Normalised quaternions (..., 4) and a mask (...) of those that needed no repair.
+
+    A zero or non-finite quaternion carries no rotation: it becomes NaN, so that nothing downstream
+    mistakes it for "no rotation".
+    """
+    q = np.asarray(quaternion_xyzw, dtype=np.float64)
+    norm = np.linalg.norm(q, axis=-1)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        unit = q / norm[..., None]
+        sound = np.abs(norm - 1.0) <= tolerance
+    unit[~(norm > 1e-9)] = np.nan
+    return unit, sound
+
+
+def rotation_matrix(quaternion_xyzw: ArrayLike) -> Array:
+    """Rotation matrices (..., 3, 3) of quaternions (..., 4); they are normalised first."""
+    q, _ = unit_quaternion(quaternion_xyzw)
+    x, y, z, w = q[..., 0], q[..., 1], q[..., 2], q[..., 3]
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+    ]
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+def matrix(translation_xyz: ArrayLike, quaternion_xyzw: ArrayLike) -> Array:
+    """T (..., 4, 4) from translation (..., 3) in metres and quaternion (..., 4)."""
+    translation = np.asarray(translation_xyz, dtype=np.float64)
+    T = np.zeros((*translation.shape[:-1], 4, 4))
+    T[..., :3, :3] = rotation_matrix(quaternion_xyzw)
+    T[..., :3, 3] = translation
+    T[..., 3, 3] = 1.0
+    return T
+
+
+def inverse(T_a_b: ArrayLike) -> Array:
+    """T_b_a (..., 4, 4) from T_a_b."""
+    T = np.asarray(T_a_b, dtype=np.float64)
+    out = np.zeros_like(T)
+    R_t = np.swapaxes(T[..., :3, :3], -1, -2)
+    out[..., :3, :3] = R_t
+    out[..., :3, 3] = -(R_t @ T[..., :3, 3:])[..., 0]
+    out[..., 3, 3] = 1.0
+    return out
+
+
+def quaternion_from_yaw(yaw: ArrayLike) -> Array:
+    """Quaternions (..., 4) xyzw of rotations by `yaw` rad about z."""
+    half = np.asarray(yaw, dtype=np.float64) / 2.0
+    zero = np.zeros_like(half)
+    return np.stack([zero, zero, np.sin(half), np.cos(half)], axis=-1)
+
+
+def yaw_from_quaternion(quaternion_xyzw: ArrayLike) -> Array:
+    """Heading in radians (...): the z angle of the z-y-x Euler angles, as tf's getYaw gives it."""
+    q, _ = unit_quaternion(quaternion_xyzw)
+    x, y, z, w = q[..., 0], q[..., 1], q[..., 2], q[..., 3]
+    return np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+
+
+def planar(T_a_b: ArrayLike) -> Array:
+    """The planar pose (..., 3) x y yaw of T (..., 4, 4): z, roll and pitch are left out."""
+    T = np.asarray(T_a_b, dtype=np.float64)
+    yaw = np.arctan2(T[..., 1, 0], T[..., 0, 0])
+    return np.stack([T[..., 0, 3], T[..., 1, 3], wrap_angle(yaw)], axis=-1)
+
+
+def from_planar(xyyaw: ArrayLike) -> Array:
+    """T (..., 4, 4) in the plane z = 0 from poses (..., 3)."""
+    pose = np.asarray(xyyaw, dtype=np.float64)
+    cos, sin = np.cos(pose[..., 2]), np.sin(pose[..., 2])
+    T = np.zeros((*pose.shape[:-1], 4, 4))
+    T[..., 0, 0], T[..., 0, 1], T[..., 0, 3] = cos, -sin, pose[..., 0]
+    T[..., 1, 0], T[..., 1, 1], T[..., 1, 3] = sin, cos, pose[..., 1]
+    T[..., 2, 2] = T[..., 3, 3] = 1.0
+    return T

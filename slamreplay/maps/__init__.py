@@ -1,0 +1,1 @@
+"""Occupancy grids: files, versions, likelihood fields and rays."""

@@ -1,0 +1,50 @@
+"""Named things that are loaded when asked for: estimators, perturbations, decoders, checks."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from difflib import get_close_matches
+from importlib import import_module
+from importlib.metadata import entry_points
+from typing import Any
+
+from slamreplay.errors import UsageError
+
+
+class Registry:
+    """Names of one kind of thing, each with the place it is loaded from.
+
+    Args:
+        kind: what one entry is, in the singular ("estimator"); the entry point group is
+            `slamreplay.<kind>s`, by which other packages add theirs.
+        builtin: name to "module:attribute". Nothing is imported before `load`.
+    """
+
+    def __init__(self, kind: str, builtin: Mapping[str, str]) -> None:
+        self.kind = kind
+        self._builtin = dict(builtin)
+
+    def targets(self) -> dict[str, str]:
+        """Every name with the "module:attribute" it is loaded from, sorted; ours win."""
+        found = {e.name: e.value for e in entry_points(group=f"slamreplay.{self.kind}s")}
+        return dict(sorted({**found, **self._builtin}.items()))
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.targets())
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.targets()
+
+    def load(self, name: str) -> Any:
+        """The object registered under `name`.
+
+        Raises:
+            UsageError: nothing has that name; the hint holds the nearest one.
+        """
+        targets = self.targets()
+        if name not in targets:
+            near = get_close_matches(name, targets, n=1)
+            hint = f"did you mean '{near[0]}'?" if near else f"there are: {', '.join(targets)}"
+            raise UsageError(f"there is no {self.kind} '{name}'", hint=hint)
+        module, _, attribute = targets[name].partition(":")
+        return getattr(import_module(module), attribute)
