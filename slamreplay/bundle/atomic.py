@@ -1,4 +1,4 @@
-"""Folders and files that are whole or absent: written under a temporary name, renamed at the end."""
+"""Folders and files that are whole or absent: written elsewhere, renamed at the end."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the robot believed at any time: the recorded localizer, as the planner would have read it."""
+"""What the robot believed at any time: the localizer as the planner would have read it."""
 
 from __future__ import annotations
 

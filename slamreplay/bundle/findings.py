@@ -120,7 +120,7 @@ FINDINGS: dict[str, Explanation] = {
     ),
     "SR-DAT-001": Explanation(
         "Parts of the replay bundle are missing",
-        "Are all eight parts there: odometry, IMU, scans, pose, covariance, map, costmap, recovery?",
+        "Are odometry, IMU, scans, pose, covariance, map, costmap and recovery actions there?",
         "Roles that no topic could play.",
         "Hidden topics (actions) are recorded only on request: absence of a topic proves nothing.",
     ),

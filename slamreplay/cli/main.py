@@ -2,10 +2,26 @@
 
 from __future__ import annotations
 
+import hashlib
+import os
 import sys
+import tempfile
+import traceback
 from importlib import import_module
+from pathlib import Path
+from typing import Annotated
 
+import click
 import typer
+
+from slamreplay import __version__
+from slamreplay.errors import SlamreplayError
+
+#: Exit codes of design: 1 is raised by the commands that were asked to judge (`--fail-on`).
+EXIT_INPUT, EXIT_FAULT, EXIT_INTERRUPTED = 2, 70, 130
+
+#: Command modules, in the order of the help; each has `register(app)` and imports nothing heavy.
+COMMANDS = ("report", "ingest", "inspect", "perturb", "simulate", "explain", "list_")
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -15,16 +31,84 @@ app = typer.Typer(
     help="Replay a robot's log and say whether the robot was lost or the map had changed.",
 )
 
-#: Command modules; each registers one command on `app` by a function `register(app)`.
-COMMANDS = ()
+
+def _print_version(value: bool) -> None:
+    if value:
+        typer.echo(f"slamreplay {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _root(
+    debug: Annotated[  # noqa: ARG001 - read from sys.argv, where faults before parsing see it too
+        bool, typer.Option("--debug", help="Show the traceback of a fault.")
+    ] = False,
+    version: Annotated[  # noqa: ARG001 - its callback does the work
+        bool,
+        typer.Option(
+            "--version", help="Print the version.", callback=_print_version, is_eager=True
+        ),
+    ] = False,
+) -> None:
+    """Options that hold for every command."""
 
 
 def main() -> None:
-    """Run the program; faults the user can mend become one line and exit code 2."""
-    for name in COMMANDS:
-        import_module(f"slamreplay.cli.{name}").register(app)
-    app()
+    """Run the program; a fault the user can mend becomes one line and exit code 2."""
+    sys.exit(run())
+
+
+def run() -> int:
+    """The exit code of the command in `sys.argv`."""
+    debug = "--debug" in sys.argv
+    try:
+        for name in COMMANDS:
+            import_module(f"slamreplay.cli.{name}").register(app)
+        return int(app(standalone_mode=False) or 0)
+    except click.ClickException as error:
+        error.show()
+        return EXIT_INPUT
+    except (click.Abort, KeyboardInterrupt):
+        typer.echo("stopped", err=True)
+        return EXIT_INTERRUPTED
+    except BrokenPipeError:  # the reader of our output went away: `slamreplay inspect B | head`
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+    except SlamreplayError as error:
+        if debug:
+            traceback.print_exc()
+        typer.echo(f"slamreplay: {error}", err=True)
+        return EXIT_INPUT
+    except Exception as error:  # the last resort: whatever gets here is a fault of ours
+        if debug:
+            traceback.print_exc()
+        typer.echo(
+            f"slamreplay: a fault of ours: {type(error).__name__}: {str(error)[:200]} "
+            f"(written to {_crash_file()}; --debug shows it)",
+            err=True,
+        )
+        return EXIT_FAULT
+
+
+def _crash_file() -> Path:
+    """Where the traceback was written: the cache folder, or the temporary one if that fails."""
+    text = f"slamreplay {__version__}\n{' '.join(sys.argv)}\n\n{traceback.format_exc()}"
+    name = f"crash-{hashlib.sha256(text.encode()).hexdigest()[:12]}.txt"
+    for folder in (cache_folder(), Path(tempfile.gettempdir())):
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            (folder / name).write_text(text, encoding="utf-8")
+        except OSError:
+            continue
+        return folder / name
+    return Path(os.devnull)
+
+
+def cache_folder() -> Path:
+    """`$XDG_CACHE_HOME/slamreplay`, by default under ~/.cache."""
+    named = os.environ.get("XDG_CACHE_HOME")
+    return (Path(named) if named else Path.home() / ".cache") / "slamreplay"
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()

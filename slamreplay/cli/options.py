@@ -1,0 +1,103 @@
+"""Arguments and options that several commands share, and what they mean together."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from slamreplay.errors import UsageError
+
+if TYPE_CHECKING:
+    from slamreplay.bundle.view import Bundle
+    from slamreplay.ingest.options import IngestOptions
+
+Logs = Annotated[
+    list[Path],
+    typer.Argument(
+        metavar="LOG...",
+        help="ROS 1 .bag, rosbag2 folder, .mcap or .db3 (several are one log), or one bundle.",
+    ),
+]
+MapYaml = Annotated[
+    Path | None,
+    typer.Option("--map", metavar="YAML", help="The map that was driven on, of map_server."),
+]
+Topics = Annotated[
+    Path | None,
+    typer.Option("--topics", metavar="YAML", help="Which topic plays which role, as ROLE: TOPIC."),
+]
+Robot = Annotated[
+    str | None,
+    typer.Option("--robot", metavar="NS", help="Namespace of the robot to look at."),
+]
+Reference = Annotated[
+    Path | None,
+    typer.Option("--reference", metavar="FILE", help="Reference poses as TUM or CSV: they judge."),
+]
+Start = Annotated[
+    float | None,
+    typer.Option("--start", metavar="S", help="Leave out what is earlier, in s from the start."),
+]
+End = Annotated[
+    float | None,
+    typer.Option("--end", metavar="S", help="Leave out what is later, in s from the start."),
+]
+Seed = Annotated[int, typer.Option("--seed", help="Seed of every random number.")]
+Json = Annotated[bool, typer.Option("--json", help="Print JSON on stdout.")]
+
+
+def ingest_options(
+    *,
+    map_yaml: Path | None,
+    topics: Path | None,
+    robot: str | None,
+    reference: Path | None,
+    start_s: float | None,
+    end_s: float | None,
+) -> IngestOptions:
+    """The options of a command line as ingest takes them."""
+    from slamreplay.ingest.options import IngestOptions
+
+    return IngestOptions(
+        map=map_yaml, topics=topics, robot=robot, reference=reference, start_s=start_s, end_s=end_s
+    )
+
+
+@contextmanager
+def evidence(
+    logs: Sequence[Path], options: IngestOptions, *, keep: Path | None = None
+) -> Iterator[Bundle]:
+    """The bundle behind a command's LOG argument; a raw log is ingested on the way.
+
+    Args:
+        logs: a bundle, or the files of one log.
+        options: how to ingest; a bundle was ingested already and takes none.
+        keep: where the bundle of a raw log is written; by default it lives as long as the block.
+
+    Raises:
+        UsageError: options that only a raw log can take, given with a bundle.
+    """
+    from slamreplay.bundle.store import is_bundle
+    from slamreplay.bundle.view import Bundle
+    from slamreplay.cli.progress import progress_bar
+    from slamreplay.ingest.options import IngestOptions
+    from slamreplay.ingest.pipeline import ingest
+
+    if len(logs) == 1 and is_bundle(logs[0]):
+        if options != IngestOptions():
+            raise UsageError(
+                "a bundle takes no --map, --topics, --robot, --reference, --start or --end",
+                where=logs[0],
+                hint="give the raw log, or ingest it again with them",
+            )
+        yield Bundle.open(logs[0])
+        return
+    with TemporaryDirectory(prefix="slamreplay-") as folder:
+        with progress_bar("reading") as progress:
+            bundle = ingest(logs, keep or Path(folder) / "log.bundle", options, progress=progress)
+        yield bundle
