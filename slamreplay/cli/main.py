@@ -40,10 +40,10 @@ def _print_version(value: bool) -> None:
 
 @app.callback()
 def _root(
-    debug: Annotated[  # noqa: ARG001 - read from sys.argv, where faults before parsing see it too
+    debug: Annotated[
         bool, typer.Option("--debug", help="Show the traceback of a fault.")
     ] = False,
-    version: Annotated[  # noqa: ARG001 - its callback does the work
+    version: Annotated[
         bool,
         typer.Option(
             "--version", help="Print the version.", callback=_print_version, is_eager=True

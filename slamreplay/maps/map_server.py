@@ -21,6 +21,8 @@ from slamreplay.maps.grid import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
 
 MODES = ("trinary", "scale", "raw")
 PIXEL_OCCUPIED, PIXEL_FREE, PIXEL_UNKNOWN = 0, 254, 205
+#: Just under the 50 / 255 of an unknown pixel, which a threshold of 0.25 would read as free.
+FREE_THRESH = 0.196
 
 
 def read_map(yaml_path: Path, *, warn: Callable[[str], None]) -> OccupancyGrid:
@@ -78,7 +80,7 @@ def map_files(grid: OccupancyGrid, stem: str) -> dict[str, bytes]:
         "origin": grid.origin_xyyaw.tolist(),
         "negate": 0,
         "occupied_thresh": 0.65,
-        "free_thresh": 0.25,
+        "free_thresh": FREE_THRESH,
     }
     text = yaml.safe_dump(meta, sort_keys=False, default_flow_style=None)
     return {f"{stem}.yaml": text.encode(), f"{stem}.pgm": pgm(np.flipud(pixels))}
@@ -101,7 +103,7 @@ def _read_meta(yaml_path: Path) -> dict[str, Any]:
     if not isinstance(meta, dict):
         raise MapError("not a map yaml: it holds no keys", where=yaml_path)
     # Maps saved by old tools lack the thresholds; these are map_server's own defaults.
-    meta = {"occupied_thresh": 0.65, "free_thresh": 0.25, **meta}
+    meta = {"occupied_thresh": 0.65, "free_thresh": FREE_THRESH, **meta}
     missing = [key for key in ("image", "resolution", "origin") if key not in meta]
     if missing:
         raise MapError(f"map yaml lacks {', '.join(missing)}", where=yaml_path)
@@ -125,7 +127,7 @@ def _read_image(path: Path, yaml_path: Path) -> tuple[NDArray[np.float64], NDArr
             where=yaml_path,
             hint="the path in 'image' is taken relative to the yaml",
         ) from error
-    except (OSError, UnidentifiedImageError, Image.DecompressionBombError) as error:
+    except (OSError, ValueError, UnidentifiedImageError, Image.DecompressionBombError) as error:
         raise MapError(
             f"its image '{path.name}' cannot be read: {error}", where=yaml_path
         ) from error
