@@ -1,0 +1,103 @@
+"""The program through its real entry point: start-up cost, faults, exit codes."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import slamreplay
+from slamreplay.cli import main as cli
+
+HEAVY = ("numpy", "pandas", "scipy", "numba", "gtsam", "open3d", "matplotlib", "rosbags", "pyarrow")
+PROGRAM = [str(Path(sys.executable).with_name("slamreplay"))]
+
+
+def run(*arguments, cwd=None, env=None):
+    return subprocess.run(
+        [*PROGRAM, *arguments], capture_output=True, text=True, cwd=cwd, env=env, timeout=120
+    )
+
+
+def test_help_imports_nothing_heavy():
+    code = (
+        "import sys; sys.argv = ['slamreplay', '--help']\n"
+        "from slamreplay.cli.main import run\n"
+        "code = run()\n"
+        "import json; print('\\n' + json.dumps([code, sorted(sys.modules)]))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+
+    code, modules = json.loads(done.stdout.splitlines()[-1])
+
+    assert code == 0
+    assert not set(HEAVY) & set(modules)
+
+
+def test_help_names_every_command():
+    text = run("--help").stdout
+
+    for command in ("ingest", "inspect", "perturb", "report", "simulate", "explain", "list"):
+        assert f"\n  {command} " in text
+
+
+@pytest.mark.parametrize("command", ["ingest", "inspect", "perturb", "report", "simulate", "list"])
+def test_every_command_has_help(command):
+    done = run(command, "--help")
+
+    assert done.returncode == 0
+    assert "Usage" in done.stdout
+
+
+def test_version():
+    assert run("--version").stdout == f"slamreplay {slamreplay.__version__}\n"
+
+
+def test_unknown_command_is_a_usage_error():
+    done = run("replay")
+
+    assert done.returncode == 2
+    assert "No such command" in done.stderr
+
+
+def test_fault_of_ours_leaves_a_crash_file(monkeypatch, tmp_path, capsys):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    monkeypatch.setattr(sys, "argv", ["slamreplay", "inspect", "x"])
+
+    def broken(**_):
+        raise ZeroDivisionError("boom")
+
+    monkeypatch.setattr(cli, "app", broken)
+
+    assert cli.run() == 70
+    line = capsys.readouterr().err.strip()
+    assert "\n" not in line
+    (crash,) = (tmp_path / "slamreplay").iterdir()
+    assert crash.name in line
+    assert "ZeroDivisionError: boom" in crash.read_text()
+
+
+def says_one_line(done):
+    """The fault in one line on stderr, exit code 2, nothing on stdout."""
+    assert done.returncode == 2, done.stderr
+    assert done.stdout == ""
+    assert len(done.stderr.strip().splitlines()) == 1, done.stderr
+    assert "Traceback" not in done.stderr
+    return done.stderr
+
+
+def test_text_file_named_bag(tmp_path):
+    (tmp_path / "notes.bag").write_text("the robot stopped again\n")
+
+    text = says_one_line(run("report", "notes.bag", "-o", "out", cwd=tmp_path))
+
+    assert "notes.bag" in text
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["notes.bag"]
+
+
+def test_missing_log(tmp_path):
+    text = says_one_line(run("ingest", "gone.mcap", "-o", "b", cwd=tmp_path))
+
+    assert "gone.mcap" in text
+    assert not list(tmp_path.iterdir())
