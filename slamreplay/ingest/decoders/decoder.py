@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from operator import attrgetter
@@ -31,6 +31,10 @@ class Messages:
 
     def __len__(self) -> int:
         return len(self._items)
+
+    def __iter__(self) -> Iterator[Any]:
+        """The messages one by one, for types whose layout is inside the message."""
+        return iter(self._items)
 
     def has(self, path: str) -> bool:
         """Whether the message definition has the field (False where there are no messages)."""

@@ -1,0 +1,43 @@
+"""What decoders do with values that cannot be: mend and count, or leave the row out and count."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from slamreplay.bundle.tables import Ragged
+from slamreplay.geometry import se3
+from slamreplay.geometry.times import Times
+from slamreplay.ingest.decoders.decoder import Decoded, Remark
+
+
+def pose_rows(
+    position_xyz: ArrayLike, orientation_xyzw: ArrayLike
+) -> tuple[NDArray[np.float64], NDArray[np.bool_], tuple[Remark, ...]]:
+    """Unit quaternions (N, 4), the mask (N,) of usable poses, and remarks on the others."""
+    position = np.asarray(position_xyz, dtype=np.float64)
+    unit, sound = se3.unit_quaternion(orientation_xyzw)
+    turned = np.isfinite(unit).all(axis=1)
+    placed = np.isfinite(position).all(axis=1)
+    remarks = (
+        Remark("repaired", int((turned & placed & ~sound).sum()), "quaternion normalised"),
+        Remark("lost", int((~turned).sum()), "quaternion is zero or not finite"),
+        Remark("lost", int((turned & ~placed).sum()), "position is not finite"),
+    )
+    return unit, turned & placed, remarks
+
+
+def kept(
+    keep: NDArray[np.bool_],
+    columns: Mapping[str, Any],
+    rows: NDArray[np.int64],
+    t_sensor_ns: Times,
+    remarks: tuple[Remark, ...],
+) -> Decoded:
+    """The rows (N,) under the mask `keep`, of every column."""
+    index = np.flatnonzero(keep)
+    taken = {k: v.take(index) if isinstance(v, Ragged) else v[index] for k, v in columns.items()}
+    return Decoded(taken, rows[index], t_sensor_ns[index], remarks)

@@ -1,0 +1,1 @@
+"""Containers of messages: each file format gives connections and raw messages, nothing more."""

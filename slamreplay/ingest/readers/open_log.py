@@ -1,0 +1,168 @@
+"""Which container a path is, judged by its first bytes, and several files as one log."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import yaml
+
+from slamreplay.bundle.manifest import Loss, Source
+from slamreplay.errors import LogError
+from slamreplay.ingest.readers import mcap_file, ros1, sqlite_file
+from slamreplay.ingest.readers.reader import Reader
+
+_ZSTD = b"\x28\xb5\x2f\xfd"
+_SUFFIXES = {".bag", ".mcap", ".db3", ".zstd"}
+
+
+@contextmanager
+def open_log(paths: Sequence[Path]) -> Iterator[tuple[list[Reader], list[Loss]]]:
+    """Readers of all files behind the paths, and losses on the way (a file given twice).
+
+    Raises:
+        LogError: a path does not exist, or is no log.
+    """
+    losses: list[Loss] = []
+    with ExitStack() as stack:
+        readers: list[Reader] = []
+        seen: set[str] = set()
+        for path in paths:
+            for file, compression in _files(path, losses):
+                digest = _hash(file)
+                if digest in seen:
+                    losses.append(
+                        Loss(kind="skipped", what=file.name, count=1, reason="the same file twice")
+                    )
+                    continue
+                seen.add(digest)
+                readers.append(_open(file, digest, compression, stack))
+        if not readers:
+            raise LogError("no storage file in it", where=paths[0] if paths else None)
+        yield readers, losses
+
+
+def _files(path: Path, losses: list[Loss]) -> list[tuple[Path, str]]:
+    """Storage files of a path, each with its per-message compression ("" for none)."""
+    if path.is_file():
+        return [(path, "")]
+    if not path.exists():
+        raise LogError("no such file or folder", where=path)
+    meta = _metadata(path / "metadata.yaml")
+    compression = ""
+    if str(meta.get("compression_mode", "")).lower() == "message":
+        compression = str(meta.get("compression_format", ""))
+    listed = [str(name) for name in meta.get("relative_file_paths") or []]
+    files = []
+    for name in listed:
+        places = [path / name, path / Path(name).name, path / f"{name}.zstd"]
+        found = next((p for p in places if p.is_file()), None)
+        if found is None:
+            losses.append(
+                Loss(kind="lost", what=name, count=1, reason="metadata.yaml names it, not there")
+            )
+        else:
+            files.append(found)
+    if not files:  # without a usable metadata.yaml the folder itself says what belongs to it
+        files = sorted(p for p in path.iterdir() if p.suffix in _SUFFIXES and p.is_file())
+        if files:
+            losses.append(
+                Loss(
+                    kind="repaired",
+                    what="metadata.yaml",
+                    count=1,
+                    reason="missing or empty; read the storage files themselves",
+                )
+            )
+    if not files:
+        raise LogError(
+            "a folder without a storage file",
+            where=path,
+            hint="give a .bag, .mcap or .db3, or a folder of rosbag2",
+        )
+    return [(file, compression) for file in files]
+
+
+def _metadata(path: Path) -> dict[str, Any]:
+    try:
+        whole = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, yaml.YAMLError):
+        return {}
+    meta = whole.get("rosbag2_bagfile_information") if isinstance(whole, dict) else None
+    return meta if isinstance(meta, dict) else {}
+
+
+def _open(path: Path, digest: str, compression: str, stack: ExitStack) -> Reader:
+    file = path
+    head = _head(path)
+    if head.startswith(_ZSTD):
+        file = _decompressed(path, stack)
+        head = _head(file)
+    kinds: list[tuple[bytes, str, Callable[[Path, Source], Reader]]] = [
+        (ros1.MAGIC, "ros1", ros1.Ros1Reader),
+        (mcap_file.MAGIC, "mcap", mcap_file.McapReader),
+        (sqlite_file.MAGIC, "sqlite3", sqlite_file.SqliteReader),
+    ]
+    for magic, name, reader in kinds:
+        if head.startswith(magic):
+            size = path.stat().st_size
+            source = Source(name=path.name, format=name, bytes=size, sha256=digest)
+            opened = reader(file, source)
+            return _Decompressing(opened) if compression == "zstd" else opened
+    what = "the file is empty" if not head else "not a log that is known here"
+    raise LogError(what, where=path, hint="a ROS 1 .bag, .mcap or rosbag2 .db3 is expected")
+
+
+class _Decompressing:
+    """A reader whose messages are compressed one by one (rosbag2 compression_mode MESSAGE)."""
+
+    def __init__(self, inner: Reader) -> None:
+        self._inner = inner
+        self.sources, self.connections = inner.sources, inner.connections
+        self.losses = inner.losses
+
+    def messages(self, wanted: Any) -> Iterator[tuple[int, int, bytes]]:
+        import zstandard
+
+        broken = 0
+        for index, t_log_ns, data in self._inner.messages(wanted):
+            try:
+                yield index, t_log_ns, zstandard.ZstdDecompressor().decompressobj().decompress(data)
+            except zstandard.ZstdError:
+                broken += 1
+        if broken:
+            what = f"{self.sources[0].name}: messages"
+            self.losses.append(Loss(kind="lost", what=what, count=broken, reason="not zstd"))
+
+
+def _head(path: Path) -> bytes:
+    try:
+        with path.open("rb") as stream:
+            return stream.read(64)
+    except OSError as error:
+        raise LogError(f"cannot read: {error.strerror or error}", where=path) from error
+
+
+def _hash(path: Path) -> str:
+    try:
+        with path.open("rb") as stream:
+            return hashlib.file_digest(stream, "sha256").hexdigest()
+    except OSError as error:
+        raise LogError(f"cannot read: {error.strerror or error}", where=path) from error
+
+
+def _decompressed(path: Path, stack: ExitStack) -> Path:
+    import zstandard
+
+    folder = stack.enter_context(TemporaryDirectory(prefix="slamreplay-"))
+    out = Path(folder) / path.stem
+    try:
+        with path.open("rb") as source, out.open("wb") as target:
+            zstandard.ZstdDecompressor().copy_stream(source, target)
+    except (zstandard.ZstdError, OSError) as error:
+        raise LogError(f"its zstd compression is damaged: {error}", where=path) from error
+    return out
