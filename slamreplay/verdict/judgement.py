@@ -1,0 +1,142 @@
+"""The verdict and what it rests on: the types that the report prints."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from slamreplay.bundle.findings import Finding
+
+State = Literal[
+    "healthy", "lost", "map_changed", "lost_and_map_changed", "unobservable", "insufficient_data"
+]
+STATES: tuple[State, ...] = (
+    "healthy",
+    "lost",
+    "map_changed",
+    "lost_and_map_changed",
+    "unobservable",
+    "insufficient_data",
+)
+
+FailureKind = Literal[
+    "sensing_ambiguity",
+    "association_error",
+    "optimization_drift",
+    "stale_map_use",
+    "timing",
+    "odometry_slip",
+    "wrong_initial_pose",
+    "kidnapped",
+    "overconfidence",
+    "wrong_map",
+    "none",
+]
+
+
+@dataclass(frozen=True)
+class Interval:
+    """A stretch [start_ns, end_ns) of one state.
+
+    Attributes:
+        confidence: that the state is the right one, None where nothing was decided. Not calibrated
+            yet: see `confidence`.
+        max_error_m: largest distance between belief and hindsight in it, None where unknown.
+        max_error_rad: largest difference in heading, rad.
+        findings: ids of the findings that made the state.
+    """
+
+    state: State
+    start_ns: int
+    end_ns: int
+    confidence: float | None = None
+    max_error_m: float | None = None
+    max_error_rad: float | None = None
+    findings: tuple[str, ...] = ()
+
+    @property
+    def duration_ns(self) -> int:
+        """How long it lasted."""
+        return self.end_ns - self.start_ns
+
+    @property
+    def is_lost(self) -> bool:
+        """Whether the robot was lost in it."""
+        return self.state in ("lost", "lost_and_map_changed")
+
+    @property
+    def is_changed(self) -> bool:
+        """Whether the map was contradicted in it."""
+        return self.state in ("map_changed", "lost_and_map_changed")
+
+
+@dataclass(frozen=True)
+class FailureMode:
+    """How it began to fail, with the sentences that say so."""
+
+    kind: FailureKind
+    confidence: float | None
+    evidence: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Stop:
+    """An unplanned stop.
+
+    Attributes:
+        x_m: where the robot really was in the map frame, else where it believed to be; None where
+            neither is known.
+        state: of the interval it fell into.
+        cause: first cause, in one sentence.
+    """
+
+    t_ns: int
+    x_m: float | None
+    y_m: float | None
+    state: State
+    cause: str
+
+
+@dataclass(frozen=True)
+class Action:
+    """A recovery or a motion, and whether the uncertainty of that moment allowed it.
+
+    Attributes:
+        sigma_m: standard deviation of the position towards the nearest obstacle.
+        clearance_m: from the footprint's edge to that obstacle.
+        ratio: 3 sigma over clearance; None where either is unknown or there is no clearance left.
+        allowed: whether 3 sigma fit into the clearance; None where that is unknown.
+    """
+
+    t_ns: int
+    kind: Literal["recovery", "motion"]
+    name: str
+    sigma_m: float | None
+    clearance_m: float | None
+    ratio: float | None
+    allowed: bool | None
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """One log's verdict.
+
+    Attributes:
+        state: of the log as a whole.
+        confidence: that it is the right one, never 1; None where nothing was decided.
+        summary: one sentence a shift lead understands.
+        intervals: tile the log without gap or overlap.
+        failure_mode: how it began.
+        stops: every unplanned stop, in time order.
+        actions: recoveries and motions, in time order.
+        findings: what made the verdict, worst first.
+    """
+
+    state: State
+    confidence: float | None
+    summary: str
+    intervals: tuple[Interval, ...]
+    failure_mode: FailureMode
+    stops: tuple[Stop, ...]
+    actions: tuple[Action, ...]
+    findings: tuple[Finding, ...]
