@@ -1,0 +1,1 @@
+"""Adaptive Monte Carlo localization as nav2_amcl does it, replayable bit by bit."""
