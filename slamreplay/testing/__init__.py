@@ -1,0 +1,1 @@
+"""The public conformance kit, and a small synthetic bundle for tests of any stage."""

@@ -1,0 +1,281 @@
+"""A bundle made in memory: a robot drives round a small room, and everything about it is known."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from slamreplay.bundle.manifest import Clock, FrameEdge, Frames, Manifest, MapVersion, Missing, Role
+from slamreplay.bundle.schema import TABLES
+from slamreplay.bundle.tables import Table
+from slamreplay.bundle.view import Bundle
+from slamreplay.geometry import se2, se3
+from slamreplay.geometry.covariance import ros_from_planar
+from slamreplay.geometry.times import NS_PER_S, ns
+from slamreplay.maps.grid import OccupancyGrid
+from slamreplay.maps.raycast import cast_rays
+
+START_NS = 1_700_000_000 * NS_PER_S
+#: How much later than its stamp a message is recorded.
+LATENCY_NS = 5_000_000
+#: The laser on the robot; neither straight nor central, so that a forgotten mount shows.
+MOUNT_XYYAW = np.array([0.15, 0.02, 0.05])
+RANGE_MAX_M = 10.0
+_BEAMS = 181
+_SPEED_M_S = 0.5
+
+
+def room_grid() -> OccupancyGrid:
+    """A room of 12 x 9 m at 5 cm without symmetry; its grid lies turned in the map frame."""
+    cells = np.zeros((180, 240), dtype=np.int8)
+    cells[[0, 1, -2, -1]] = 100
+    cells[:, [0, 1, -2, -1]] = 100
+    cells[80:100, 100:140] = 100  # an island inside the path
+    cells[150:178, 20:30] = 100  # corners that differ from each other
+    cells[2:14, 200:238] = 100
+    cells[160:170, 150:190] = 100
+    return OccupancyGrid(cells, 0.05, np.array([-2.0, 1.0, 0.1]))
+
+
+def true_path(t_s: NDArray[np.float64]) -> se2.Array:
+    """(N, 3) where the robot is at times (N,): round an ellipse at 0.5 m/s, in the map frame."""
+    angle = np.linspace(0.0, 40.0 * np.pi, 40_001)
+    x, y = 6.0 + 3.8 * np.cos(angle), 4.5 + 2.4 * np.sin(angle)
+    travelled = np.append(0.0, np.cumsum(np.hypot(np.diff(x), np.diff(y))))
+    at = np.interp(np.asarray(t_s) * _SPEED_M_S, travelled, angle)
+    heading = np.arctan2(2.4 * np.cos(at), -3.8 * np.sin(at))
+    in_room = np.column_stack([6.0 + 3.8 * np.cos(at), 4.5 + 2.4 * np.sin(at), heading])
+    return se2.compose(room_grid().origin_xyyaw, in_room)
+
+
+def synthetic_bundle(
+    *,
+    seconds: float = 20.0,
+    seed: int = 0,
+    world: OccupancyGrid | None = None,
+    with_map: bool = True,
+    with_initial_pose: bool = True,
+    with_belief: bool = True,
+    belief_offset_xyyaw: Sequence[float] = (0.0, 0.0, 0.0),
+    offset_from_s: float = 0.0,
+) -> Bundle:
+    """A bundle in memory, with scans, odometry, tf, map, belief, initial pose and reference.
+
+    Args:
+        seconds: length of the log; scans come at 10 Hz, odometry at 20 Hz, the belief at 2 Hz.
+        seed: of the noise: 1 cm on ranges, 1 % and a slow drift on odometry.
+        world: what the laser sees; None means the room as mapped. Edit `room_grid().cells` for an
+            aisle that changed.
+        with_map: whether the log holds the map.
+        with_initial_pose: whether somebody set the pose at the start.
+        with_belief: whether a localizer's pose and map->odom were recorded.
+        belief_offset_xyyaw: how far that belief is from the truth (in the robot's frame),
+        offset_from_s: from then on, in seconds after the start.
+    """
+    rng = np.random.Generator(np.random.PCG64(seed))
+    options = (seconds, seed, with_map, with_initial_pose, with_belief)
+    offset = tuple(float(v) for v in belief_offset_xyyaw)
+    seen = room_grid() if world is None else world
+    identity = repr((*options, offset, offset_from_s, seen.version))
+
+    scan_s = np.arange(0.0, seconds, 0.1)
+    odometry_s = np.arange(0.0, seconds + 0.05, 0.05)
+    belief_s = np.arange(0.0, seconds, 0.5)
+    T_odom_base = _drifting(true_path(odometry_s), rng)
+    at_belief = se2.interpolate(_ns(odometry_s), T_odom_base, _ns(belief_s))
+    off = np.where((belief_s >= offset_from_s)[:, None], np.asarray(offset), 0.0)
+    noise = rng.normal(0.0, [0.01, 0.01, 0.003], (len(belief_s), 3))
+    T_map_base = se2.compose(true_path(belief_s), off + noise)
+
+    tables = {
+        "scans": _scans(scan_s, seen, rng),
+        "odometry": _odometry(odometry_s, T_odom_base),
+        "references": _poses("references", "/truth", odometry_s, true_path(odometry_s), 1e-6),
+    }
+    transforms = [
+        _tf("odom", "base_link", odometry_s, T_odom_base),
+        _tf("base_link", "laser", np.zeros(1), MOUNT_XYYAW[None], is_static=True),
+    ]
+    if with_belief:
+        T_map_odom = se2.compose(T_map_base, se2.inverse(at_belief))
+        transforms.append(_tf("map", "odom", belief_s, T_map_odom, ahead_s=0.1))
+        tables["poses"] = _poses("poses", "/amcl_pose", belief_s, T_map_base, 1e-3)
+    if with_initial_pose:
+        start = se2.compose(true_path(np.zeros(1)), np.array([0.1, -0.1, 0.05]))
+        tables["initial_poses"] = _poses("initial_poses", "/initialpose", np.zeros(1), start, 0.05)
+    tables["transforms"] = Table.concat(TABLES["transforms"], transforms)
+    grids = {room_grid().version: room_grid()} if with_map else {}
+    manifest = _manifest(tables, identity, seconds, with_map, with_belief)
+    return Bundle(manifest, tables, grids)
+
+
+def _manifest(
+    tables: dict[str, Table], identity: str, seconds: float, with_map: bool, with_belief: bool
+) -> Manifest:
+    roles = {"scans": "scan", "odometry": "odometry", "references": "reference"}
+    roles |= {"initial_poses": "initial_pose"} if "initial_poses" in tables else {}
+    found = [(role, str(tables[name]["topic"][0])) for name, role in roles.items()]
+    if with_belief:
+        found += [("pose", "/amcl_pose"), ("covariance", "/amcl_pose")]
+    lacking = ["imu", "costmap", "recovery"]
+    lacking += [] if with_belief else ["pose", "covariance"]
+    lacking += [] if with_map else ["map"]
+    tf = tables["transforms"]
+    pairs = sorted(set(zip(tf["parent_frame"], tf["child_frame"], tf["is_static"], strict=True)))
+    tree = [
+        FrameEdge(
+            parent=parent,
+            child=child,
+            is_static=bool(static),
+            samples=int(((tf["parent_frame"] == parent) & (tf["child_frame"] == child)).sum()),
+        )
+        for parent, child, static in pairs
+    ]
+    grid = room_grid()
+    version = MapVersion(
+        version=grid.version,
+        folder=grid.version.removeprefix("sha256:")[:16],
+        source="synthetic room",
+        width=grid.cells.shape[1],
+        height=grid.cells.shape[0],
+        resolution_m=grid.resolution_m,
+    )
+    return Manifest(
+        bundle_id=hashlib.sha256(identity.encode()).hexdigest()[:16],
+        sources=[],
+        options={},
+        start_ns=START_NS,
+        end_ns=START_NS + ns(seconds),
+        clock=Clock(name="sensor", reason="synthetic", knots=[(START_NS + LATENCY_NS, START_NS)]),
+        frames=Frames(map="map" if with_belief else None, odom="odom", base="base_link", tree=tree),
+        roles=[
+            Role(role=role, topic=topic, type="synthetic", messages=0, reason="the only one")
+            for role, topic in found
+        ],
+        missing=[Missing(part=part, reason="not made", consequence="none") for part in lacking],
+        maps=[version] if with_map else [],
+        losses=[],
+        tables={},
+    )
+
+
+def _drifting(xyyaw: se2.Array, rng: np.random.Generator) -> se2.Array:
+    """(N, 3) what wheels make of a path (N, 3): increments with noise, from the odometry's zero."""
+    steps = se2.between(xyyaw[:-1], xyyaw[1:])
+    length = np.linalg.norm(steps[:, :2], axis=1, keepdims=True)
+    noise = rng.standard_normal(steps.shape) * np.array([0.02, 0.005, 0.02]) * np.sqrt(length)
+    steps = steps * np.array([1.01, 1.0, 0.99]) + noise
+    out = np.zeros_like(xyyaw)
+    for k, step in enumerate(steps):
+        out[k + 1] = se2.compose(out[k], step)
+    return out
+
+
+def _scans(t_s: NDArray[np.float64], world: OccupancyGrid, rng: np.random.Generator) -> Table:
+    angle_min, step = -2.2, 4.4 / (_BEAMS - 1)
+    laser = se2.compose(true_path(t_s), MOUNT_XYYAW)
+    ranges = cast_rays(
+        world, laser, angle_min + step * np.arange(_BEAMS, dtype=np.float64), RANGE_MAX_M
+    )
+    ranges = ranges + rng.normal(0.0, 0.01, ranges.shape)
+    return _table(
+        "scans",
+        "/scan",
+        t_s,
+        frame_id="laser",
+        angle_min_rad=angle_min,
+        angle_increment_rad=step,
+        time_increment_s=0.0,
+        scan_time_s=0.1,
+        range_min_m=0.05,
+        range_max_m=RANGE_MAX_M,
+        ranges_m=list(ranges),
+    )
+
+
+def _odometry(t_s: NDArray[np.float64], xyyaw: se2.Array) -> Table:
+    speed = np.linalg.norm(np.gradient(xyyaw[:, :2], 0.05, axis=0), axis=1)
+    turn = np.gradient(np.unwrap(xyyaw[:, 2]), 0.05)
+    zero = np.zeros_like(speed)
+    return _table(
+        "odometry",
+        "/odom",
+        t_s,
+        frame_id="odom",
+        child_frame_id="base_link",
+        **_pose_columns(xyyaw),
+        pose_covariance=np.full((len(t_s), 36), np.nan),
+        linear_velocity_xyz=np.column_stack([speed, zero, zero]),
+        angular_velocity_xyz=np.column_stack([zero, zero, turn]),
+        twist_covariance=np.full((len(t_s), 36), np.nan),
+    )
+
+
+def _poses(
+    name: str, topic: str, t_s: NDArray[np.float64], xyyaw: se2.Array, variance: float
+) -> Table:
+    extra = {
+        "references": {"kind": "simulation", "child_frame_id": "base_link"},
+        "poses": {"source": topic, "child_frame_id": "base_link"},
+        "initial_poses": {},
+    }[name]
+    cov = np.broadcast_to(np.diag([variance, variance, variance / 4]), (len(t_s), 3, 3))
+    return _table(
+        name,
+        topic,
+        t_s,
+        frame_id="map",
+        covariance=ros_from_planar(cov),
+        **_pose_columns(xyyaw),
+        **extra,
+    )
+
+
+def _tf(
+    parent: str,
+    child: str,
+    t_s: NDArray[np.float64],
+    xyyaw: se2.Array,
+    *,
+    is_static: bool = False,
+    ahead_s: float = 0.0,
+) -> Table:
+    pose = _pose_columns(xyyaw)
+    table = _table(
+        "transforms",
+        "/tf_static" if is_static else "/tf",
+        t_s,
+        parent_frame=parent,
+        child_frame=child,
+        is_static=is_static,
+        translation_xyz=pose["position_xyz"],
+        rotation_xyzw=pose["orientation_xyzw"],
+    )
+    return table.replace(t_ns=table.t_ns + ns(ahead_s), t_sensor_ns=table.t_ns + ns(ahead_s))
+
+
+def _pose_columns(xyyaw: se2.Array) -> dict[str, se2.Array]:
+    position = np.column_stack([xyyaw[:, :2], np.zeros(len(xyyaw))])
+    return {"position_xyz": position, "orientation_xyzw": se3.quaternion_from_yaw(xyyaw[:, 2])}
+
+
+def _table(name: str, topic: str, t_s: NDArray[np.float64], **columns: Any) -> Table:
+    """A table whose scalars are repeated for every row."""
+    t_ns = _ns(t_s)
+    whole: dict[str, Any] = {
+        "t_ns": t_ns,
+        "t_sensor_ns": t_ns,
+        "t_log_ns": t_ns + LATENCY_NS,
+        "topic": topic,
+    }
+    whole |= columns
+    rows = {k: [v] * len(t_ns) if np.ndim(v) == 0 else v for k, v in whole.items()}
+    return Table(TABLES[name], rows)
+
+
+def _ns(t_s: NDArray[np.float64]) -> NDArray[np.int64]:
+    return np.rint(np.asarray(t_s) * NS_PER_S).astype(np.int64) + START_NS
