@@ -72,6 +72,13 @@ FINDINGS: dict[str, Explanation] = {
         "Neither a transform between the map and odometry frames nor a pose topic was recorded.",
         "Recorded under an unusual type or name: give the topic in a topics file.",
     ),
+    "SR-LOC-004": Explanation(
+        "Moments that cannot be judged",
+        "Does hindsight know where the robot was well enough to judge the belief?",
+        "No pose, a standard deviation larger than the limit, or a scan that the map explains far "
+        "worse than the log's typical one; longer than 1 s.",
+        "Heavy changes lower the match as well; beams known to have changed are not counted.",
+    ),
     "SR-MAP-001": Explanation(
         "The aisle had changed",
         "Do beams, cast from where the robot really was, contradict the map and stay that way?",
@@ -112,11 +119,31 @@ FINDINGS: dict[str, Explanation] = {
         "Rows whose x y yaw block fails the test, counted; they are left out of NEES.",
         "Some localizers publish zero covariance on purpose until they are initialised.",
     ),
+    "SR-CON-003": Explanation(
+        "Consistency could not be decided",
+        "Was there enough independent evidence to hold the covariance against an error?",
+        "Refused without a reference or a covariance, in different frames, or below 20 effective "
+        "samples (n over the integrated autocorrelation time of the NEES series).",
+        "Undecided is neither consistent nor inconsistent.",
+    ),
     "SR-CLK-001": Explanation(
         "Clocks disagree",
         "Do header stamps and log times tell the same story?",
         "Median offset of log time minus header stamp, and its drift over the log.",
         "Simulated time is meant to differ; replayed bags carry the old stamps.",
+    ),
+    "SR-ACT-001": Explanation(
+        "An action the uncertainty did not allow",
+        "Did 3 standard deviations of the position fit between the robot and the nearest obstacle?",
+        "Published covariance projected onto the direction of the nearest obstacle (local costmap, "
+        "else map) against the clearance from the footprint's edge.",
+        "An over-confident covariance lets everything pass; the costmap's obstacles may be people.",
+    ),
+    "SR-ACT-002": Explanation(
+        "An unplanned stop",
+        "Did the robot stop before it had arrived?",
+        "Odometry comes to rest, and a recovery follows, commands go on, or the plan's end is far.",
+        "A goal that was cancelled on purpose looks the same: goals are not in the log's topics.",
     ),
     "SR-DAT-001": Explanation(
         "Parts of the replay bundle are missing",

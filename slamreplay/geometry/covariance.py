@@ -52,13 +52,17 @@ def ros_from_gtsam(covariance: ArrayLike, R_parent_body: ArrayLike) -> Array:
 
 def planar_from_gtsam(covariance: ArrayLike, yaw: ArrayLike) -> Array:
     """Parent-axes x y yaw covariances (..., 3, 3) from gtsam Pose2 (body axes) and headings."""
-    turn = _yaw_rotation(np.asarray(yaw, dtype=np.float64))
-    return turn @ np.asarray(covariance, dtype=np.float64) @ np.swapaxes(turn, -1, -2)
+    return turned(covariance, yaw)
 
 
 def gtsam_from_planar(covariance: ArrayLike, yaw: ArrayLike) -> Array:
     """Gtsam Pose2 covariances (..., 3, 3), body axes, from parent-axes ones and headings in rad."""
-    turn = _yaw_rotation(-np.asarray(yaw, dtype=np.float64))
+    return turned(covariance, -np.asarray(yaw, dtype=np.float64))
+
+
+def turned(covariance: ArrayLike, yaw: ArrayLike) -> Array:
+    """Planar covariances (..., 3, 3) seen from a frame turned by `yaw` (...) rad: R P R'."""
+    turn = _yaw_rotation(np.asarray(yaw, dtype=np.float64))
     return turn @ np.asarray(covariance, dtype=np.float64) @ np.swapaxes(turn, -1, -2)
 
 

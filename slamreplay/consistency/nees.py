@@ -1,0 +1,203 @@
+"""Normalised estimation error squared of a planar belief against a reference.
+
+e' (P + P_ref)^-1 e with e = belief minus reference in x, y and wrapped yaw, axes of the parent
+frame, as ROS gives the covariance (Bar-Shalom, Li, Kirubarajan 2001, section 5.4.2). Nothing is
+aligned first: an alignment would eat the error that is to be judged.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from slamreplay.bundle.track import PoseTrack
+from slamreplay.consistency.effective_samples import effective_samples
+from slamreplay.consistency.intervals import mean_interval, mean_p_value
+from slamreplay.geometry import se2
+from slamreplay.geometry.covariance import is_positive_definite
+from slamreplay.geometry.transforms import clean_frame
+
+#: An accusation needs a mean this improbable, and at least this many effective samples.
+P_ACCUSE, N_EFF_MIN = 1e-3, 20.0
+
+#: A reference is interpolated between samples no farther apart than this.
+MAX_GAP_NS = 500_000_000
+
+Part = Literal["joint", "xy", "yaw"]
+PARTS: dict[Part, tuple[int, ...]] = {"joint": (0, 1, 2), "xy": (0, 1), "yaw": (2,)}
+
+Credibility = Literal["consistent", "overconfident", "underconfident", "insufficient"]
+
+
+@dataclass(frozen=True)
+class NeesSummary:
+    """The mean of one part's NEES, and what it says.
+
+    Attributes:
+        part: joint (x y yaw), xy or yaw.
+        dof: degrees of freedom: what the mean of a consistent belief would be.
+        n: valid rows.
+        n_eff: effective samples among them.
+        mean: average NEES; None without a valid row.
+        low: lower end of the interval a consistent belief's mean misses with `P_ACCUSE` only.
+        high: upper end.
+        p_value: two-sided.
+        ratio: k = sqrt(mean / dof): sigma is too small by this factor (too large below 1).
+        credibility: insufficient below `N_EFF_MIN` effective samples: no accusation then.
+    """
+
+    part: Part
+    dof: int
+    n: int
+    n_eff: float
+    mean: float | None
+    low: float | None
+    high: float | None
+    p_value: float | None
+    ratio: float | None
+    credibility: Credibility
+
+    @property
+    def sentence(self) -> str:
+        """What a user acts on."""
+        name = {"joint": "the pose", "xy": "the position", "yaw": "the heading"}[self.part]
+        if self.mean is None or self.ratio is None:
+            return f"the sigma of {name} could not be judged: no row was valid"
+        too = "small" if self.ratio >= 1.0 else "large"
+        factor = self.ratio if self.ratio >= 1.0 else 1.0 / max(self.ratio, 1e-9)
+        text = f"the sigma of {name} is too {too} by a factor of {factor:.2g}"
+        if self.credibility == "consistent":
+            text = f"the sigma of {name} fits its error (factor {self.ratio:.2g})"
+        numbers = f"mean NEES {self.mean:.3g} where {self.dof} is expected"
+        if self.low is not None and self.high is not None:
+            numbers += f" and {self.low:.3g} to {self.high:.3g} would be chance"
+        return f"{text}: {numbers}; {self.n} updates are worth {self.n_eff:.0f} independent ones"
+
+
+@dataclass(frozen=True, eq=False)
+class Nees:
+    """NEES row by row, on the rows of the belief in time order.
+
+    Attributes:
+        t_ns: (N,) times.
+        error: (N, 3) belief minus reference, m, m, rad; NaN where either is missing.
+        joint: (N,) of x y yaw, NaN where invalid.
+        xy: (N,) of the position alone.
+        yaw: (N,) of the heading alone.
+        invalid: rows without a joint value, counted by reason.
+        has_cross_terms: whether any covariance couples position and heading. AMCL publishes none:
+            its joint value is an approximation, judge the parts.
+        refusal: why nothing could be compared, None where it could.
+    """
+
+    t_ns: NDArray[np.int64]
+    error: se2.Array
+    joint: se2.Array
+    xy: se2.Array
+    yaw: se2.Array
+    invalid: Mapping[str, int]
+    has_cross_terms: bool
+    refusal: str | None = None
+
+    def values(self, part: Part) -> se2.Array:
+        """(N,) NEES of one part."""
+        return {"joint": self.joint, "xy": self.xy, "yaw": self.yaw}[part]
+
+    def summary(self, part: Part = "joint", p: float = P_ACCUSE) -> NeesSummary:
+        """The mean of one part against its interval, missed by a consistent belief with `p`."""
+        values, dof = self.values(part), len(PARTS[part])
+        values = values[np.isfinite(values)]
+        n_eff = effective_samples(values)
+        if not len(values):
+            return NeesSummary(part, dof, 0, 0.0, None, None, None, None, None, "insufficient")
+        mean = float(values.mean())
+        low, high = mean_interval(dof, n_eff, p)
+        p_value = mean_p_value(dof, n_eff, mean)
+        verdict: Credibility = "consistent"
+        if n_eff < N_EFF_MIN:
+            verdict = "insufficient"
+        elif p_value < p:
+            verdict = "overconfident" if mean > dof else "underconfident"
+        k = math.sqrt(mean / dof)
+        return NeesSummary(part, dof, len(values), n_eff, mean, low, high, p_value, k, verdict)
+
+
+def nees(estimate: PoseTrack, reference: PoseTrack, max_gap_ns: int = MAX_GAP_NS) -> Nees:
+    """NEES of a belief at its own rows, the reference interpolated between its samples.
+
+    The reference's covariance is added where it is finite; of a reference without heading only
+    `xy` is given. Two tracks in different frames are refused, not aligned: every row is invalid
+    then and `refusal` says why.
+
+    Args:
+        estimate: the belief, one row per update: a covariance that was merely held from the update
+            before would count the same evidence again.
+        reference: the independent pose of the same frame of the robot, in the same parent frame.
+        max_gap_ns: rows between two reference samples farther apart than this stay invalid.
+    """
+    order = np.argsort(estimate.t_ns, kind="stable")
+    estimate = estimate.take(order)
+    truth = _at(reference, estimate.t_ns, max_gap_ns)
+    error = estimate.xyyaw - truth.xyyaw
+    error[:, 2] = se2.wrap_angle(error[:, 2])
+    refusal = None
+    if clean_frame(estimate.frame_id) != clean_frame(reference.frame_id):
+        refusal = (
+            f"the belief is in frame '{estimate.frame_id}', the reference in "
+            f"'{reference.frame_id}', and nothing independent of the belief ties them"
+        )
+        error = np.full_like(error, np.nan)
+    cov = estimate.cov + np.where(np.isfinite(truth.cov), truth.cov, 0.0)
+    parts = {part: _squared(error, cov, list(index)) for part, index in PARTS.items()}
+    reasons = {
+        "frames differ": np.full(len(estimate), refusal is not None),
+        "no belief": ~estimate.has_pose,
+        "no reference": ~np.isfinite(error[:, :2]).all(axis=1),
+        "no reference heading": ~np.isfinite(error[:, 2]),
+        "no covariance": ~np.isfinite(cov).all(axis=(1, 2)),
+        "covariance not positive definite": ~np.isfinite(parts["joint"]),
+    }
+    invalid, left = {}, np.ones(len(estimate), dtype=bool)
+    for reason, rows in reasons.items():  # each row counts once, under its first reason
+        if (left & rows).any():
+            invalid[reason] = int((left & rows).sum())
+        left &= ~rows
+    cross = estimate.cov[:, :2, 2]
+    crossed = bool((np.isfinite(cross) & (cross != 0.0)).any())
+    return Nees(estimate.t_ns, error, **parts, invalid=invalid, has_cross_terms=crossed,
+                refusal=refusal)  # fmt: skip
+
+
+def _at(reference: PoseTrack, t_ns: NDArray[np.int64], max_gap_ns: int) -> PoseTrack:
+    """The reference at times (M,); one without any heading gives its position all the same."""
+    headless = ~np.isfinite(reference.xyyaw[:, 2]).any()
+    if not headless:
+        return reference.at(t_ns, max_gap_ns)
+    xyyaw = reference.xyyaw.copy()
+    xyyaw[:, 2] = 0.0
+    there = PoseTrack(
+        reference.frame_id, reference.child_frame_id, reference.t_ns, xyyaw, reference.cov
+    ).at(t_ns, max_gap_ns)
+    xyyaw = there.xyyaw.copy()
+    xyyaw[:, 2] = np.nan
+    return PoseTrack(there.frame_id, there.child_frame_id, there.t_ns, xyyaw, there.cov)
+
+
+def _squared(error: se2.Array, cov: se2.Array, index: list[int]) -> se2.Array:
+    """(N,) |L^-1 e|^2 with P = L L': whitened by forward substitution, P is never inverted."""
+    e = error[:, index]
+    P = cov[:, index][:, :, index]
+    out = np.full(len(e), np.nan)
+    sound = np.isfinite(e).all(axis=1) & is_positive_definite(P)
+    L, e = np.linalg.cholesky(P[sound]), e[sound]
+    white = np.zeros_like(e)
+    for i in range(len(index)):
+        known = np.einsum("nj,nj->n", L[:, i, :i], white[:, :i])
+        white[:, i] = (e[:, i] - known) / L[:, i, i]
+    out[sound] = np.sum(white**2, axis=1)
+    return out
