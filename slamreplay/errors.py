@@ -46,3 +46,7 @@ class UsageError(SlamreplayError):
 
 class OutputError(SlamreplayError):
     """A place that cannot be written."""
+
+
+class NotApplicableError(SlamreplayError):
+    """A trial that this log or this estimator does not allow: something it needs is not there."""

@@ -8,12 +8,11 @@ from numpy.typing import ArrayLike, NDArray
 from slamreplay.errors import MapError
 from slamreplay.estimators.amcl import kernels
 from slamreplay.estimators.amcl.config import AmclConfig
+from slamreplay.estimators.start import DEFAULT_COV
 from slamreplay.geometry import se2
 from slamreplay.maps.grid import OccupancyGrid
 from slamreplay.maps.likelihood_field import distance_field
 
-#: nav2_amcl's covariance of a start whose own is unknown: 0.5 m, 0.5 m, 15 deg.
-DEFAULT_START_COV = np.diag([0.25, 0.25, (np.pi / 12.0) ** 2])
 #: Resultant length of a cloud of headings that point everywhere; keeps -2 ln R finite.
 _LEAST_RESULTANT = 1e-12
 
@@ -42,7 +41,7 @@ class AmclFilter:
         self._last_odometry: se2.Array | None = None
         self._updates = 0
         self._slow = self._fast = 0.0
-        self.initialise(np.zeros(3), DEFAULT_START_COV)
+        self.initialise(np.zeros(3), DEFAULT_COV)
 
     @property
     def particles(self) -> se2.Array:
@@ -104,6 +103,14 @@ class AmclFilter:
         """
         self._restart(self._anywhere(self._config.max_particles))
 
+    def is_due(self, odometry_xyyaw: ArrayLike) -> bool:
+        """Whether a scan taken at this odometry (3,) would update the filter."""
+        if self._last_odometry is None:
+            return True
+        delta = np.abs(_delta(self._last_odometry, odometry_xyyaw))
+        d, a = self._config.update_min_d, self._config.update_min_a
+        return bool(delta[0] > d or delta[1] > d or delta[2] > a)
+
     def update(
         self,
         odometry_xyyaw: ArrayLike,
@@ -126,18 +133,15 @@ class AmclFilter:
         Returns:
             Whether the filter was updated; if not, `mean_xyyaw` is still that of the last update.
         """
-        odometry = np.asarray(odometry_xyyaw, dtype=np.float64)
+        if not self.is_due(odometry_xyyaw):
+            return False
+        odometry = np.array(odometry_xyyaw, dtype=np.float64)
         if self._last_odometry is not None:
-            delta = odometry - self._last_odometry
-            delta[2] = se2.wrap_angle(delta[2])
-            d, a = self._config.update_min_d, self._config.update_min_a
-            if not (abs(delta[0]) > d or abs(delta[1]) > d or abs(delta[2]) > a):
-                return False
-            self._move(self._last_odometry[2], delta)
-        self._last_odometry = odometry.copy()
-        reach = range_max_m
-        if self._config.laser_max_range > 0.0:
-            reach = min(reach, self._config.laser_max_range)
+            self._move(self._last_odometry[2], _delta(self._last_odometry, odometry))
+        self._last_odometry = odometry
+        limit = self._config.laser_max_range if self._config.laser_max_range > 0.0 else np.inf
+        reach = min(range_max_m if range_max_m > 0.0 else np.inf, limit)
+        reach = reach if np.isfinite(reach) else 100.0  # neither the laser nor the user said one
         ends = self._beam_ends(bearings, ranges_m, usable, xyyaw_base_laser, reach)
         self._weigh(ends, reach)
         self._updates += 1
@@ -261,6 +265,13 @@ class AmclFilter:
         particles.setflags(write=False)
         weights.setflags(write=False)
         self._particles, self._weights = particles, weights
+
+
+def _delta(before: se2.Array, after: ArrayLike) -> se2.Array:
+    """Difference of two odometry poses (3,) along the odometry frame's axes."""
+    delta = np.asarray(after, dtype=np.float64) - before
+    delta[2] = se2.wrap_angle(delta[2])
+    return delta
 
 
 def _histogram(particles: se2.Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

@@ -19,8 +19,8 @@ _GOLDEN = 0.6180339887498949  # fractional part of the golden ratio
 def move(particles, motion, sigma, noise):  # type: ignore[no-untyped-def]
     """Move particles (N, 3) in place by first turn, distance, second turn (3,) less noise.
 
-    `noise` (N, 3) is standard normal, `sigma` (3,) its scale (Thrun, Burgard, Fox: Probabilistic
-    Robotics, table 5.6).
+    `noise` (N, 3) is standard normal, `sigma` (3,) its scale (sample_motion_odometry, Thrun,
+    Burgard, Fox: Probabilistic Robotics, p. 136).
     """
     for i in range(particles.shape[0]):
         heading = particles[i, 2] + motion[0] - sigma[0] * noise[i, 0]
@@ -61,7 +61,7 @@ def likelihoods(particles, ends, scores, off_map, origin, resolution):  # type: 
 
 @njit(cache=True)
 def kld_size(bins, count, cumulative, start, least, most, error, quantile):  # type: ignore[no-untyped-def]
-    """How many particles bound the KL distance to the true distribution (Fox 2003, eq. 7).
+    """How many particles bound the KL distance to the true distribution (Fox 2003, KLD sampling).
 
     Particles are drawn by weight until their number suffices for the k different bins seen; `bins`
     (N,) holds numbers below `count`. The draws follow a golden-ratio sequence from `start` in

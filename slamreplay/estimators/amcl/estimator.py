@@ -1,0 +1,99 @@
+"""AMCL over a whole log."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import ClassVar
+
+import numpy as np
+
+from slamreplay.bundle.run import Estimate
+from slamreplay.bundle.scans import ScanSet
+from slamreplay.bundle.track import PoseTrack
+from slamreplay.bundle.view import BundleView
+from slamreplay.estimators.amcl.config import AmclConfig
+from slamreplay.estimators.amcl.filter import AmclFilter
+from slamreplay.estimators.inputs import need_grid, need_odometry, need_scans
+from slamreplay.estimators.start import DEFAULT_COV, GLOBAL, OFFSET, ROTATE, Start, starts
+from slamreplay.geometry import se2
+
+
+@dataclass(frozen=True)
+class Amcl:
+    """Run the particle filter on every scan, from where the robot's own localizer started.
+
+    It starts from the initial pose in the log, else from the first recorded belief, else anywhere;
+    every later initial pose starts it again. Between updates the pose is carried by odometry, as
+    tf does it, and the covariance stays the published one.
+
+    Attributes:
+        config: nav2_amcl's parameters.
+    """
+
+    config: AmclConfig = field(default_factory=AmclConfig)
+
+    name: ClassVar[str] = "amcl"
+    needs: ClassVar[frozenset[str]] = frozenset({"odometry", "scans", "map"})
+    settings: ClassVar[frozenset[str]] = frozenset({OFFSET, ROTATE, GLOBAL})
+
+    def run(self, view: BundleView, *, seed: int) -> Estimate:
+        """One row per scan; NaN before the start and where the scan has no odometry.
+
+        Diagnostics: `updated` (1 where the filter took the scan in), `particles`, and `ess`, the
+        effective sample size before the latest resampling.
+
+        Raises:
+            NotApplicableError: no odometry, scans or map.
+        """
+        scans = need_scans(view, self.name)
+        odometry = need_odometry(view, self.name)
+        grid = need_grid(view, self.name)
+        T_odom_base = odometry.at(scans.t_ns).xyyaw
+        known = np.flatnonzero(np.isfinite(T_odom_base).all(axis=1))
+        given = {start.row: start for start in starts(view, scans.t_ns, T_odom_base)}
+        if not given and len(known):
+            given = {int(known[0]): Start(int(known[0]), None, DEFAULT_COV)}
+        amcl = AmclFilter(self.config, grid, seed)
+
+        n = len(scans)
+        xyyaw, cov = np.full((n, 3), np.nan), np.full((n, 3, 3), np.nan)
+        diagnostics = {name: np.full(n, np.nan) for name in ("updated", "particles", "ess")}
+        T_map_odom, published = np.zeros(3), np.zeros((3, 3))
+        first = min(given, default=n)
+        for row in known[known >= first].tolist():
+            if row in given:
+                _start(amcl, given[row])
+            updated = _update(amcl, scans, row, T_odom_base[row])
+            if updated:
+                T_map_odom = se2.compose(amcl.mean_xyyaw, se2.inverse(T_odom_base[row]))
+                published = amcl.cov
+            xyyaw[row] = se2.compose(T_map_odom, T_odom_base[row])
+            cov[row] = published
+            diagnostics["updated"][row] = float(updated)
+            diagnostics["particles"][row] = float(len(amcl.particles))
+            diagnostics["ess"][row] = amcl.ess
+        frames = view.manifest.frames
+        track = PoseTrack(
+            frames.map or grid.frame_id, frames.base or "base_link", scans.t_ns, xyyaw, cov
+        )
+        return Estimate(track, (), diagnostics)
+
+
+def _start(amcl: AmclFilter, start: Start) -> None:
+    if start.xyyaw is None:
+        amcl.initialise_globally()
+    else:
+        amcl.initialise(start.xyyaw, start.cov)
+
+
+def _update(amcl: AmclFilter, scans: ScanSet, row: int, T_odom_base: se2.Array) -> bool:
+    if not amcl.is_due(T_odom_base):
+        return False
+    return amcl.update(
+        T_odom_base,
+        scans.bearings(row),
+        scans.ranges_m[row],
+        scans.hits[row],
+        scans.xyyaw_base_laser,
+        float(scans.range_max_m[row]),
+    )

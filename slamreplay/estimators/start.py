@@ -1,0 +1,106 @@
+"""Where an estimator starts, and where somebody set the robot's pose again.
+
+A localizer starts from the pose that a person or a program gave it. A log that begins later shows
+it by its first belief.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from slamreplay.bundle.belief import arrival_ns, recorded_belief
+from slamreplay.bundle.track import PoseTrack
+from slamreplay.bundle.view import BundleView
+from slamreplay.geometry import se2, se3
+from slamreplay.geometry.covariance import planar_from_ros
+
+#: nav2_amcl's covariance of a start whose own is unknown: 0.5 m, 0.5 m, 15 deg.
+DEFAULT_COV = np.diag([0.25, 0.25, (np.pi / 12.0) ** 2])
+
+#: Settings a perturbation may change: metres ahead along the start's heading, radians to the left,
+#: and 1 for a start that knows nothing.
+OFFSET, ROTATE, GLOBAL = "initial_pose_offset_m", "initial_pose_rotate_rad", "initial_pose_global"
+
+
+@dataclass(frozen=True, eq=False)
+class Start:
+    """A pose that an estimator is given.
+
+    Attributes:
+        row: from which row on it holds.
+        xyyaw: (3,) base in map at that row; None means it may be anywhere.
+        cov: (3, 3) of it.
+    """
+
+    row: int
+    xyyaw: se2.Array | None
+    cov: se2.Array
+
+
+def starts(view: BundleView, t_ns: NDArray[np.int64], T_odom_base: se2.Array) -> list[Start]:
+    """Every pose that is given to an estimator, in order of rows; empty where nobody said any.
+
+    Args:
+        view: the log, and the settings that perturb its first start.
+        t_ns: (N,) times of the estimator's rows, sorted.
+        T_odom_base: (N, 3) odometry at these times, NaN where unknown: there nothing starts.
+    """
+    rows = np.flatnonzero(np.isfinite(T_odom_base).all(axis=1))
+    found = _given(view, t_ns, T_odom_base, rows)
+    belief = recorded_belief(view, t_ns[rows])
+    if belief is not None and belief.has_pose.any():
+        k = int(np.argmax(belief.has_pose))
+        if not found or rows[k] < found[0].row:
+            found.insert(0, Start(int(rows[k]), belief.xyyaw[k], _sound(belief.cov[k])))
+    if found:
+        found[0] = _perturbed(found[0], view)
+    elif view.settings.get(GLOBAL) and len(rows):
+        found = [Start(int(rows[0]), None, DEFAULT_COV)]
+    return found
+
+
+def _given(
+    view: BundleView,
+    t_ns: NDArray[np.int64],
+    T_odom_base: se2.Array,
+    rows: NDArray[np.int64],
+) -> list[Start]:
+    table = view.role("initial_pose")
+    if table is None:
+        return []
+    if view.manifest.frames.map:  # nav2 ignores a pose in another frame, too
+        table = table.take(table["frame_id"] == view.manifest.frames.map)
+    arrived = np.maximum(arrival_ns(view, table["t_log_ns"]), table.t_ns)
+    order = np.argsort(arrived, kind="stable")
+    yaw = se3.yaw_from_quaternion(table["orientation_xyzw"])
+    poses = np.column_stack([table["position_xyz"][:, :2], yaw])
+    covs = planar_from_ros(table["covariance"])
+    odometry = PoseTrack.without_covariance("odom", "base", t_ns[rows], T_odom_base[rows])
+    at_stamp = odometry.at(table.t_ns).xyyaw
+    found: dict[int, Start] = {}
+    for k in order:
+        after = rows[np.searchsorted(t_ns[rows], arrived[k], side="left") :]
+        if not len(after) or not np.isfinite(poses[k]).all():
+            continue
+        moved = se2.between(at_stamp[k], T_odom_base[after[0]])
+        pose = se2.compose(poses[k], np.where(np.isfinite(moved), moved, 0.0))
+        found[int(after[0])] = Start(int(after[0]), pose, _sound(covs[k]))  # the latest holds
+    return [found[row] for row in sorted(found)]
+
+
+def _sound(cov: se2.Array) -> se2.Array:
+    if not np.isfinite(cov).all() or np.linalg.eigvalsh(cov)[0] < 0.0:
+        return DEFAULT_COV
+    return cov
+
+
+def _perturbed(start: Start, view: BundleView) -> Start:
+    if view.settings.get(GLOBAL):
+        return Start(start.row, None, start.cov)
+    off = np.array([view.settings.get(OFFSET, 0.0), 0.0, view.settings.get(ROTATE, 0.0)])
+    if start.xyyaw is None or not off.any():
+        return start
+    return Start(start.row, se2.compose(start.xyyaw, off), start.cov)
