@@ -1,0 +1,1 @@
+"""Pose graphs on GTSAM; the only package that imports it."""

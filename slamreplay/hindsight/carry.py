@@ -1,0 +1,94 @@
+"""Every scan gets a pose: carried by odometry from keyframe to keyframe."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from slamreplay.geometry import se2
+from slamreplay.hindsight.beams import HIT, Beams
+from slamreplay.matching.field import ScoreField
+
+
+def carry(
+    t_ns: NDArray[np.int64],
+    odometry: se2.Array,
+    keys: NDArray[np.int64],
+    poses: se2.Array,
+    is_open: NDArray[np.bool_],
+    beams: Beams,
+    field: ScoreField,
+) -> tuple[se2.Array, NDArray[np.int64]]:
+    """Poses (N, 3) of all scans, and the keyframe (N,) whose covariance and trust each shares.
+
+    Between two keyframes the scans follow odometry; what it misses on the way is spread evenly over
+    the time. Over an open link (kidnapped, chain broken) each scan goes to the side it fits.
+
+    Args:
+        t_ns: (N,) scan times.
+        odometry: (N, 3) odometry at the scans.
+        keys: (K,) indices of the keyframes among the scans, ascending, K >= 1.
+        poses: (K, 3) their poses.
+        is_open: (K - 1,) links over which the motion is not known.
+        beams: the scans.
+        field: score field of the map, to choose sides.
+    """
+    scan = np.arange(len(t_ns))
+    before = np.clip(np.searchsorted(keys, scan, side="right") - 1, 0, len(keys) - 1)
+    after = np.minimum(before + 1, len(keys) - 1)
+    after[scan < keys[0]] = 0
+    ahead = se2.compose(poses[before], se2.between(odometry[keys[before]], odometry))
+    back = se2.compose(poses[after], se2.between(odometry[keys[after]], odometry))
+    span = np.maximum(t_ns[keys[after]] - t_ns[keys[before]], 1)
+    part = np.clip((t_ns - t_ns[keys[before]]) / span, 0.0, 1.0)[:, None]
+    missing = se2.between(ahead, back)
+    carried = se2.compose(ahead, part * missing)
+    share = np.where(part[:, 0] > 0.5, after, before)
+    over = np.zeros(len(t_ns), dtype=bool)
+    if len(is_open):
+        over = is_open[np.minimum(before, len(is_open) - 1)] & (after > before)
+    if over.any():
+        later = scan_scores(field, beams, back) > scan_scores(field, beams, ahead)
+        carried[over] = np.where(later[:, None], back, ahead)[over]
+        share[over] = np.where(later, after, before)[over]
+    carried[keys], share[keys] = poses, np.arange(len(keys))
+    return carried, share
+
+
+def scan_scores(field: ScoreField, beams: Beams, poses: se2.Array) -> se2.Array:
+    """(N,) mean score of each scan's hits at poses (N, 3); NaN without a hit or a pose."""
+    return np.asarray(
+        _scan_scores(
+            field.values,
+            field.resolution_m,
+            field.corner_xy,
+            beams.ends,
+            beams.kind,
+            np.ascontiguousarray(poses),
+        )
+    )
+
+
+@njit(cache=True)
+def _scan_scores(values, resolution, corner, ends, kind, poses):  # type: ignore[no-untyped-def]
+    height, width = values.shape
+    out = np.full(poses.shape[0], np.nan)
+    for s in range(poses.shape[0]):
+        if not np.isfinite(poses[s, 0]):
+            continue
+        cos, sin = np.cos(poses[s, 2]), np.sin(poses[s, 2])
+        total, count = 0.0, 0
+        for b in range(ends.shape[1]):
+            if kind[s, b] != HIT:
+                continue
+            x = poses[s, 0] + cos * ends[s, b, 0] - sin * ends[s, b, 1]
+            y = poses[s, 1] + sin * ends[s, b, 0] + cos * ends[s, b, 1]
+            col = int(np.floor((x - corner[0]) / resolution))
+            row = int(np.floor((y - corner[1]) / resolution))
+            count += 1
+            if 0 <= row < height and 0 <= col < width:
+                total += values[row, col]
+        if count:
+            out[s] = total / count
+    return out

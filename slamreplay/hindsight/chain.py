@@ -1,0 +1,105 @@
+"""Scan-matched odometry: each keyframe laid onto the last ones, odometry as the first guess."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from slamreplay.geometry import se2
+from slamreplay.matching.correlative import Match, Window, climb, match, search_window
+from slamreplay.matching.field import ScoreField, points_field
+from slamreplay.matching.thinning import thin
+
+SIGMA_M = 0.08
+#: How many keyframes back the local map reaches, and how far around the robot.
+MEMORY, RADIUS_M = 12, 15.0
+#: Below this mean score (or at the window's edge) the odometry's word is doubted.
+GOOD, POOR = 0.6, 0.35
+#: A wider search must beat the narrow one by this much: the odometry is a witness as well.
+GAIN = 0.08
+NARROW = Window(0.3, 0.05, np.radians(12.0), np.radians(1.5), pull=0.03)
+WIDE = Window(1.2, 0.1, np.radians(20.0), np.radians(2.0), pull=0.03)
+AROUND = Window(0.6, 0.1, np.pi, np.radians(3.0), pull=0.03)
+
+
+@dataclass(frozen=True, eq=False)
+class Chain:
+    """Keyframes in a drifting frame.
+
+    Attributes:
+        xyyaw: (K, 3) poses.
+        score: (K,) how well each fits the ones before it; 1 for the first.
+        is_break: (K,) nothing before it was found in its scan: the motion to it is not known.
+        information: (K, 3, 3) of each pose against the local map, chain axes.
+    """
+
+    xyyaw: se2.Array
+    score: se2.Array
+    is_break: NDArray[np.bool_]
+    information: se2.Array
+
+
+def scan_matched(points: Sequence[se2.Array], odometry: se2.Array | None) -> Chain:
+    """Match each scan against a local map of the scans before it.
+
+    Args:
+        points: K arrays (M, 2), ends of the beams in the base frame.
+        odometry: (K, 3) poses in the odom frame, or None: then each motion is expected to be the
+            one before, and scans that hardly moved do not enter the local map.
+    """
+    n = len(points)
+    xyyaw, score = np.zeros((n, 3)), np.ones(n)
+    is_break, information = np.zeros(n, dtype=bool), np.zeros((n, 3, 3))
+    memory: list[tuple[int, se2.Array]] = []
+    for k in range(n):
+        scan = thin(points[k], 0.1)
+        if k and memory:
+            last = xyyaw[k - 1]
+            if odometry is not None:
+                guess = se2.compose(last, se2.between(odometry[k - 1], odometry[k]))
+            else:
+                motion = se2.between(xyyaw[k - 2], last) if k > 1 else np.zeros(3)
+                guess = se2.compose(last, motion)
+            found = _lay(memory, xyyaw, scan, guess, last)
+            score[k], information[k] = found.score, found.information
+            is_break[k] = found.score < POOR
+            xyyaw[k] = guess if is_break[k] else found.xyyaw
+        if is_break[k]:
+            memory = []
+        # Without odometry the scans come at sensor rate: what hardly moved adds nothing.
+        step = se2.between(xyyaw[memory[-1][0]], xyyaw[k]) if memory else np.ones(3)
+        if odometry is not None or np.hypot(step[0], step[1]) > 0.1 or abs(step[2]) > 0.1:
+            memory = [*memory[1 - MEMORY :], (k, scan)]
+    return Chain(xyyaw, score, is_break, information)
+
+
+def _lay(
+    memory: list[tuple[int, se2.Array]],
+    xyyaw: se2.Array,
+    scan: se2.Array,
+    guess: se2.Array,
+    last: se2.Array,
+) -> Match:
+    field = _local_map(memory, xyyaw, last)
+    if field is None or not len(scan):
+        return Match(guess, 0.0, np.zeros((3, 3)))
+    start, _ = search_window(field, scan, guess, NARROW)
+    best = climb(field, scan, start)
+    at_edge = np.abs(start - guess)[:2].max() > NARROW.reach_m - 1e-6
+    if best.score < GOOD or at_edge:
+        for centre, window in ((guess, WIDE), (last, AROUND)):
+            wide = match(field, scan[::2], centre, window)
+            wide = match(field, scan, wide.xyyaw, Window(0.1, 0.05, 0.04, 0.02))
+            best = wide if wide.score > best.score + GAIN else best
+    return best
+
+
+def _local_map(
+    memory: list[tuple[int, se2.Array]], xyyaw: se2.Array, centre: se2.Array
+) -> ScoreField | None:
+    cloud = np.concatenate([se2.transform_points(xyyaw[k], points) for k, points in memory])
+    near = np.abs(cloud - centre[:2]).max(axis=1) < RADIUS_M
+    return points_field(cloud[near], SIGMA_M) if near.any() else None

@@ -1,0 +1,78 @@
+"""Hypotheses of each submap: the best places on the whole map, and where its neighbours put it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from slamreplay.geometry import se2
+from slamreplay.hindsight.places import Hypotheses
+from slamreplay.hindsight.submaps import Submap, blocked_share
+from slamreplay.matching.correlative import Window, climb, match
+from slamreplay.matching.field import WorkingMap
+from slamreplay.matching.whole_map import SearchSpace, distinct, search_map
+
+COUNT, PASSED_ON = 40, 6
+#: Each mapped wall that a ray crosses speaks against a place, but softly: it may be gone.
+BLOCKED_WEIGHT, BLOCKED_FREE = 0.2, 0.05
+_NEAR = Window(0.3, 0.1, np.radians(4.0), np.radians(2.0), pull=0.02)
+
+
+def hypotheses_of(
+    space: SearchSpace,
+    working: WorkingMap,
+    found: Sequence[Submap],
+    motions: se2.Array,
+    is_break: NDArray[np.bool_],
+    say: Callable[[float], None],
+) -> list[Hypotheses]:
+    """Hypotheses of every submap, best first.
+
+    A submap in a changed part of the map may fit many places better than its own; the measured
+    motion from a neighbour that is certain puts its own place on the list.
+
+    Args:
+        space: the map to search.
+        working: the same map's walls.
+        found: the S submaps.
+        motions: (S - 1, 3) from each reference to the next.
+        is_break: (S - 1,) motions that are not known.
+        say: told the share done.
+    """
+    lists = []
+    for i, submap in enumerate(found):
+        poses, scores = search_map(space, submap.points, count=COUNT)
+        lists.append(_scored(working, submap, poses, scores))
+        say((i + 1) / len(found))
+    for s, broken in enumerate(is_break):
+        if not broken:
+            onward = se2.compose(lists[s].xyyaw[:PASSED_ON], motions[s])
+            lists[s + 1] = _joined(space, working, found[s + 1], lists[s + 1], onward)
+    for s in range(len(is_break) - 1, -1, -1):
+        if not is_break[s]:
+            back = se2.compose(lists[s + 1].xyyaw[:PASSED_ON], se2.inverse(motions[s]))
+            lists[s] = _joined(space, working, found[s], lists[s], back)
+    return lists
+
+
+def _scored(working: WorkingMap, submap: Submap, poses: se2.Array, scores: se2.Array) -> Hypotheses:
+    blocked = blocked_share(working, submap, poses)
+    scores = scores - BLOCKED_WEIGHT * np.maximum(0.0, blocked - BLOCKED_FREE)
+    order = np.argsort(-scores, kind="stable")
+    return Hypotheses(poses[order], scores[order])
+
+
+def _joined(
+    space: SearchSpace, working: WorkingMap, submap: Submap, known: Hypotheses, new: se2.Array
+) -> Hypotheses:
+    tops = [match(space.fine, submap.points, pose, _NEAR) for pose in new]
+    # As expected and unmoved too: where nothing of the map is left, a climb leads astray.
+    stays = [climb(space.fine, submap.points, pose) for pose in new[:1]]
+    poses = np.array([m.xyyaw for m in (*tops, *stays)])
+    fresh = _scored(working, submap, poses, np.array([m.score for m in (*tops, *stays)]))
+    poses = np.concatenate([known.xyyaw, fresh.xyyaw])
+    scores = np.concatenate([known.score, fresh.score])
+    keep = distinct(poses, scores, len(poses), apart_m=0.1, apart_rad=0.05)
+    return Hypotheses(poses[keep], scores[keep])

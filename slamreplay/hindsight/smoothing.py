@@ -1,0 +1,78 @@
+"""From places to poses: each keyframe matched to the map, all of them in one robust pose graph."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from slamreplay.geometry import se2
+from slamreplay.geometry.covariance import gtsam_from_planar
+from slamreplay.graph.planar import smooth_chain
+from slamreplay.hindsight.chain import Chain
+from slamreplay.matching.correlative import Window, match
+from slamreplay.matching.field import ScoreField
+from slamreplay.matching.thinning import thin
+
+WINDOWS = (
+    Window(0.3, 0.05, np.radians(5.0), np.radians(1.0), pull=0.05),
+    Window(0.1, 0.05, np.radians(1.5), np.radians(0.75), pull=0.02),
+)
+#: A keyframe whose scan fits the map worse is held by its neighbours only.
+MIN_SCORE = 0.3
+#: Neighbouring keyframes match the same walls with the same errors of the map: about this many
+#: anchors say one thing, so each is given that much more variance.
+SAME_EVIDENCE = 10.0
+#: What a map and a scanner leave in any match: metres, metres, radians.
+FLOOR = np.array([0.02, 0.02, 0.004])
+
+
+def smooth(
+    field: ScoreField,
+    points: Sequence[se2.Array],
+    start: se2.Array,
+    chain: Chain,
+    is_open: NDArray[np.bool_],
+) -> tuple[se2.Array, se2.Array]:
+    """Keyframe poses (K, 3) in the field's frame and their covariances (K, 3, 3) in its axes.
+
+    Args:
+        field: the map's score field.
+        points: K scans in the base frame.
+        start: (K, 3) where the places put the keyframes.
+        chain: the scan-matched odometry between them.
+        is_open: (K - 1,) where the motion is not known.
+    """
+    thinned = [thin(p, 0.1) for p in points]
+    motions = se2.between(chain.xyyaw[:-1], chain.xyyaw[1:])
+    cov = _motion_covariance(chain, motions)
+    poses = start
+    spread = np.broadcast_to(np.diag(FLOOR**2), (len(start), 3, 3))
+    for window in WINDOWS:
+        tops = [match(field, p, at, window) for p, at in zip(thinned, poses, strict=True)]
+        held = np.flatnonzero([m.score >= MIN_SCORE for m in tops])
+        anchors = np.array([tops[k].xyyaw for k in held]).reshape(-1, 3)
+        information = np.array([tops[k].information for k in held]).reshape(-1, 3, 3)
+        anchor_cov = SAME_EVIDENCE * _covariance(information, np.array([1.0, 1.0, 0.3]))
+        poses, spread = smooth_chain(poses, motions, cov, is_open, held, anchors, anchor_cov)
+    return poses, spread + np.diag(FLOOR**2)
+
+
+def _motion_covariance(chain: Chain, motions: se2.Array) -> se2.Array:
+    """(K - 1, 3, 3) in axes of the earlier pose: what the match holds, else what odometry says."""
+    way, turn = np.hypot(motions[:, 0], motions[:, 1]), np.abs(motions[:, 2])
+    odometry = np.column_stack([0.03 + 0.2 * way, 0.03 + 0.2 * way, 0.02 + 0.1 * turn])
+    doubt = np.maximum(1.0, 0.7 / np.maximum(chain.score[1:], 0.05))
+    cov = _covariance(chain.information[1:], odometry)
+    cov = (cov + np.diag([0.01**2, 0.01**2, 0.003**2])) * doubt[:, None, None] ** 2
+    return gtsam_from_planar(cov, chain.xyyaw[:-1, 2])
+
+
+def _covariance(information: se2.Array, prior_sigma: se2.Array) -> se2.Array:
+    """Inverse of information (N, 3, 3), never wider than the prior's sigmas (3,) or (N, 3)."""
+    values, vectors = np.linalg.eigh(0.5 * (information + np.swapaxes(information, 1, 2)))
+    sound = (vectors * np.maximum(values, 0.0)[:, None, :]) @ np.swapaxes(vectors, 1, 2)
+    prior = np.zeros_like(sound)
+    prior[:, range(3), range(3)] = 1.0 / np.asarray(prior_sigma) ** 2
+    return np.linalg.inv(sound + prior)
