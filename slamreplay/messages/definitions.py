@@ -1,9 +1,9 @@
-"""Layouts of message types that logs of mobile robots hold and that ship with neither ROS release.
+"""Layouts of message types that logs of mobile robots hold and that no type store of rosbags has.
 
-Recorders since ROS 2 Iron, MCAP and ROS 1 bags carry the definitions of their types; a db3 of Humble
-or older does not, and then these are used. Only field types, names and order matter to a decoder, so
-comments and constants are left out. Written in ROS 2 spelling, which ROS 1 stores understand too
-(`std_msgs/Header` is whatever the store says it is).
+Recorders since ROS 2 Iron, MCAP and ROS 1 bags carry the definitions of their types; a db3 of
+Humble or older does not, and then these are used. Only types, names and order of fields matter to
+a decoder, so comments and constants are left out. Written in ROS 2 spelling, which ROS 1 stores
+understand too (`std_msgs/Header` is whatever the store says it is).
 
 Sources: ros-navigation/navigation2 (nav2_msgs), ros-planning/navigation_msgs (map_msgs,
 move_base_msgs), christianrauch/apriltag_msgs, UbiquityRobotics/fiducials, magazino/move_base_flex.

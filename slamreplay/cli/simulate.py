@@ -1,0 +1,62 @@
+"""`slamreplay simulate`: logs whose truth is known."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from slamreplay.errors import UsageError
+from slamreplay.simulate import SCENARIOS
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command."""
+    app.command(name="simulate", help=_HELP)(_simulate)
+
+
+_HELP = (
+    "Make a log whose truth is known, from a scenario and a seed.\n\nScenarios:\n\n"
+    + "\n\n".join(f"{name}: {line}" for name, line in SCENARIOS.items())
+)
+
+
+def _simulate(
+    scenario: Annotated[
+        str | None, typer.Argument(metavar="SCENARIO", help="What happens; see above.")
+    ] = None,
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "-o",
+            "--output",
+            metavar="LOG",
+            help="The log: .mcap, .db3, .bag, or no suffix for a rosbag2 folder.",
+        ),
+    ] = None,
+    seed: Annotated[
+        int | None,
+        typer.Option("--seed", min=0, help="Seed of every random number; else the scenario's own."),
+    ] = None,
+    samples: Annotated[
+        bool, typer.Option("--samples", help="Make all sample logs anew, in the folder -o.")
+    ] = False,
+) -> None:
+    from slamreplay.cli.progress import progress_bar
+
+    if output is None:
+        raise UsageError("there is no output", hint="name it with -o LOG")
+    if samples == (scenario is not None) or (samples and seed is not None):
+        raise UsageError(
+            "give either a SCENARIO (and a seed) or --samples",
+            hint=f"scenarios: {', '.join(SCENARIOS)}",
+        )
+    with progress_bar("simulating") as progress:
+        from slamreplay.simulate.pipeline import simulate, write_samples
+
+        if scenario is None:
+            write_samples(output, progress=progress)
+        else:
+            simulate(scenario, output, seed=seed)
+    typer.echo(str(output))

@@ -1,0 +1,53 @@
+"""People: discs at the height of the scan that walk to and fro."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from slamreplay.geometry import se2
+
+RADIUS_M = 0.22
+
+
+@dataclass(frozen=True)
+class Walker:
+    """Somebody who walks along waypoints and back again, without ever standing still.
+
+    Attributes:
+        waypoints: corners of the way, m.
+        speed: m/s.
+        offset_m: how far along the way they are at the start.
+    """
+
+    waypoints: tuple[tuple[float, float], ...]
+    speed: float = 1.1
+    offset_m: float = 0.0
+
+    def at(self, t_s: se2.Array) -> se2.Array:
+        """(N, 2) positions at times (N,) since the start."""
+        path = np.array(self.waypoints)
+        arcs = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(path, axis=0).T))])
+        gone = (self.offset_m + self.speed * t_s) % (2.0 * arcs[-1])
+        gone = np.where(gone > arcs[-1], 2.0 * arcs[-1] - gone, gone)
+        return np.column_stack([np.interp(gone, arcs, path[:, i]) for i in (0, 1)])
+
+
+def ranges_to(walkers: tuple[Walker, ...], t_s: se2.Array, rays: se2.Array) -> se2.Array:
+    """(N,) range to the nearest person along each ray, inf where there is none.
+
+    Args:
+        walkers: the people.
+        t_s: (N,) time of each ray since the start.
+        rays: (N, 3) origin x y and direction of each ray in the map frame, m and rad.
+    """
+    nearest = np.full(len(t_s), np.inf)
+    for walker in walkers:
+        off = walker.at(t_s) - rays[:, :2]
+        along = off[:, 0] * np.cos(rays[:, 2]) + off[:, 1] * np.sin(rays[:, 2])
+        beside2 = np.sum(off**2, axis=1) - along**2
+        half = np.sqrt(np.maximum(RADIUS_M**2 - beside2, 0.0))
+        hit = (beside2 < RADIUS_M**2) & (along > half)
+        nearest = np.where(hit, np.minimum(nearest, along - half), nearest)
+    return nearest

@@ -1,0 +1,201 @@
+"""What a recorder on the robot would have written: every message of a recording in log order."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from slamreplay.geometry import se2
+from slamreplay.geometry.times import NS_PER_S
+from slamreplay.simulate.behavior import status_changes
+from slamreplay.simulate.costmap import RESOLUTION_M, local_costmap
+from slamreplay.simulate.drive import RATE_HZ, Follow, Phase
+from slamreplay.simulate.localizer import odometry_at
+from slamreplay.simulate.messages import Messages
+from slamreplay.simulate.recording import Recording
+from slamreplay.simulate.scenarios import CLICKED_COV
+from slamreplay.simulate.sensors import XYYAW_BASE_LASER
+
+#: Stamps start here: a fixed time, for a log must not depend on when it was made.
+START_NS = 1_750_000_000 * NS_PER_S
+#: nav2_amcl dates map->odom ahead, so that it can be used until the next one comes.
+TRANSFORM_TOLERANCE_NS = NS_PER_S
+LASER_HEIGHT_M = 0.22
+#: Seconds from an event to its place in the log.
+_ODOMETRY_LATE, _IMU_LATE, _SCAN_LATE, _AMCL_LATE, _REST_LATE = 0.002, 0.001, 0.004, 0.012, 0.003
+_JITTER_S = 0.0008
+#: Topics whose last message is kept for late subscribers.
+LATCHED = frozenset({"/map", "/tf_static"})
+
+
+@dataclass(frozen=True)
+class Record:
+    """One message on its way into a log: `msgtype` is "package/Name"."""
+
+    t_log_ns: int
+    topic: str
+    msgtype: str
+    message: Any
+
+
+def records(recording: Recording, messages: Messages) -> list[Record]:
+    """All messages of a recording, sorted by log time."""
+    writers = (_start, _wheels, _inertial, _lidar, _navigator, _costmaps, _reference)
+    found = [r for write in writers for r in write(recording, messages)]
+    jitter = np.random.Generator(np.random.PCG64([recording.seed, 1]))
+    delays = (_JITTER_S * 1e9 * jitter.exponential(size=len(found))).astype(np.int64).tolist()
+    late = [
+        Record(r.t_log_ns + d, r.topic, r.msgtype, r.message)
+        for r, d in zip(found, delays, strict=True)
+    ]
+    return sorted(late, key=lambda r: r.t_log_ns)
+
+
+def _ns(t_s: float) -> int:
+    """A time since the start as a stamp."""
+    return START_NS + round(float(t_s) * NS_PER_S)
+
+
+def _start(r: Recording, m: Messages) -> Iterator[Record]:
+    laser = m.transform(_ns(0), ("base_link", "laser"), XYYAW_BASE_LASER, LASER_HEIGHT_M)
+    yield Record(_ns(0.005), "/tf_static", "tf2_msgs/TFMessage", laser)
+    grid = m.grid(_ns(0), "map", r.map.cells, r.map.resolution_m, r.map.origin_xyyaw)
+    yield Record(_ns(0.005), "/map", "nav_msgs/OccupancyGrid", grid)
+    clicked = m.pose_stamped_with_covariance(_ns(0.02), r.start, CLICKED_COV)
+    yield Record(
+        _ns(0.02 + _REST_LATE),
+        "/initialpose",
+        "geometry_msgs/PoseWithCovarianceStamped",
+        clicked,
+    )
+
+
+def _wheels(r: Recording, m: Messages) -> Iterator[Record]:
+    frames = ("odom", "base_link")
+    twist_cov = np.diag([4e-4, 1e-6, 4e-4])
+    o = r.odometry
+    for t_s, xyyaw, cov, twist in zip(o.t_s, o.xyyaw, o.cov, o.twist, strict=True):
+        stamp, arrival = _ns(t_s), _ns(t_s + _ODOMETRY_LATE)
+        message = m.odometry(stamp, frames, xyyaw, cov, twist, twist_cov)
+        yield Record(arrival, "/odom", "nav_msgs/Odometry", message)
+        yield Record(arrival, "/tf", "tf2_msgs/TFMessage", m.transform(stamp, frames, xyyaw))
+
+
+def _inertial(r: Recording, m: Messages) -> Iterator[Record]:
+    unknown = np.zeros(9)
+    unknown[0] = -1.0  # sensor_msgs/Imu: there is no orientation
+    gyro_cov, force_cov = np.eye(3).ravel() * 0.003**2, np.eye(3).ravel() * 0.04**2
+    nowhere = m.make("geometry_msgs/Quaternion", x=0.0, y=0.0, z=0.0, w=1.0)
+    for t_s, gyro, force in zip(r.motion.t_s, r.gyro, r.force, strict=True):
+        message = m.make(
+            "sensor_msgs/Imu",
+            header=m.header(_ns(t_s), "base_link"),
+            orientation=nowhere,
+            orientation_covariance=unknown,
+            angular_velocity=m.vector(*gyro),
+            angular_velocity_covariance=gyro_cov,
+            linear_acceleration=m.vector(*force),
+            linear_acceleration_covariance=force_cov,
+        )
+        yield Record(_ns(t_s + _IMU_LATE), "/imu", "sensor_msgs/Imu", message)
+
+
+def _lidar(r: Recording, m: Messages) -> Iterator[Record]:
+    """Scans, and what the localizer makes of each as soon as it is there."""
+    lidar = r.scenario.lidar
+    sweep_s = lidar.time_increment_s * (lidar.beams - 1)
+    bearings = lidar.bearings
+    b = r.beliefs
+    for i, t_s in enumerate(r.scans.t_s):
+        stamp, arrival_s = _ns(t_s), t_s + sweep_s + _SCAN_LATE
+        message = m.make(
+            "sensor_msgs/LaserScan",
+            header=m.header(stamp, "laser"),
+            angle_min=float(bearings[0]),
+            angle_max=float(bearings[-1]),
+            angle_increment=float(bearings[1] - bearings[0]),
+            time_increment=lidar.time_increment_s,
+            scan_time=1.0 / lidar.rate_hz,
+            range_min=lidar.range_min_m,
+            range_max=lidar.range_max_m,
+            ranges=r.scans.ranges[i],
+            intensities=np.empty(0, dtype=np.float32),
+        )
+        yield Record(_ns(arrival_s), "/scan", "sensor_msgs/LaserScan", message)
+        answer = _ns(arrival_s + _AMCL_LATE)
+        if b.updated[i]:
+            pose = m.pose_stamped_with_covariance(stamp, b.mean[i], b.cov[i])
+            yield Record(answer, "/amcl_pose", "geometry_msgs/PoseWithCovarianceStamped", pose)
+        frames = ("map", "odom")
+        correction = m.transform(stamp + TRANSFORM_TOLERANCE_NS, frames, b.map_odom[i])
+        yield Record(answer, "/tf", "tf2_msgs/TFMessage", correction)
+
+
+def _navigator(r: Recording, m: Messages) -> Iterator[Record]:
+    for first in range(0, len(r.motion.t_s), RATE_HZ // 10):
+        v, w = r.motion.wheels[first]
+        t_s = max(r.motion.t_s[first] - 0.02, 0.0)  # the wheels follow a moment later
+        yield Record(_ns(t_s), "/cmd_vel", "geometry_msgs/Twist", m.twist(float(v), float(w)))
+    for phase in r.motion.phases:
+        if isinstance(phase.step, Follow):
+            t_s = phase.first / RATE_HZ
+            plan = m.path(_ns(t_s), _believed_plan(r, phase))
+            yield Record(_ns(t_s + 0.06 + _REST_LATE), "/plan", "nav_msgs/Path", plan)
+    for change in status_changes(r.motion):
+        status = m.make(
+            "nav2_msgs/BehaviorTreeStatusChange",
+            timestamp=m.stamp(_ns(change.t_s)),
+            node_name=change.node,
+            uid=change.uid,
+            previous_status=change.before,
+            current_status=change.after,
+        )
+        log = m.make(
+            "nav2_msgs/BehaviorTreeLog", timestamp=m.stamp(_ns(change.t_s)), event_log=[status]
+        )
+        yield Record(
+            _ns(change.t_s + _REST_LATE), "/behavior_tree_log", "nav2_msgs/BehaviorTreeLog", log
+        )
+
+
+def _believed_plan(r: Recording, phase: Phase) -> se2.Array:
+    """The path as the robot has it on its map: moved by the error of its belief at that time."""
+    assert isinstance(phase.step, Follow)
+    corners = np.vstack([phase.path, *(np.array(phase.step.beyond).reshape(-1, 2),)])
+    arcs = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(corners, axis=0).T))])
+    at = np.arange(0.0, arcs[-1], 0.25)
+    points = np.column_stack([np.interp(at, arcs, corners[:, i]) for i in (0, 1)])
+    points = np.vstack([points, corners[-1]])
+    yaw = np.arctan2(*np.diff(points, axis=0).T[::-1])
+    true = np.column_stack([points, np.append(yaw, yaw[-1])])
+    t_s = np.array([phase.first / RATE_HZ])
+    scan = max(int(np.searchsorted(r.scans.t_s, t_s[0])) - 1, 0)
+    believed = se2.compose(r.beliefs.map_odom[scan], odometry_at(r.odometry, t_s)[0])
+    error = se2.compose(believed, se2.inverse(r.motion.poses_at(t_s)[0]))
+    return se2.compose(error, true)
+
+
+def _costmaps(r: Recording, m: Messages) -> Iterator[Record]:
+    base = odometry_at(r.odometry, r.scans.t_s)
+    every = round(r.scenario.lidar.rate_hz)
+    for i in range(0, len(r.scans.t_s), every):
+        ranges = r.scans.ranges[i].astype(np.float64)
+        costs, origin = local_costmap(base[i], r.scenario.lidar.bearings, ranges)
+        pose = np.array([*origin, 0.0])
+        t_s = r.scans.t_s[i] + 0.1
+        message = m.grid(_ns(t_s), "odom", costs, RESOLUTION_M, pose)
+        topic = "/local_costmap/costmap"
+        yield Record(_ns(t_s + _REST_LATE), topic, "nav_msgs/OccupancyGrid", message)
+
+
+def _reference(r: Recording, m: Messages) -> Iterator[Record]:
+    none, frames = np.zeros((3, 3)), ("map", "base_link")
+    t_s = np.arange(0.0, r.motion.t_s[-1], 0.05)
+    poses = r.motion.poses_at(t_s)
+    twists = r.motion.twist[np.rint(t_s * RATE_HZ).astype(np.int64)]
+    for t, xyyaw, twist in zip(t_s, poses, twists, strict=True):
+        message = m.odometry(_ns(t), frames, xyyaw, none, twist, none)
+        yield Record(_ns(t + _IMU_LATE), "/slamreplay/reference", "nav_msgs/Odometry", message)
