@@ -1,0 +1,114 @@
+"""Who plays what in a log: roles and frames settled together, for each needs the other."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from slamreplay.bundle.manifest import Frames, Loss
+from slamreplay.bundle.view import ROLE_TABLES
+from slamreplay.errors import UsageError
+from slamreplay.ingest import roles
+from slamreplay.ingest.frames import find_frames, settle
+from slamreplay.ingest.names import is_map_frame, tokens
+from slamreplay.ingest.roles import Choice
+from slamreplay.ingest.rows import TopicRows
+
+
+@dataclass(frozen=True, eq=False)
+class Cast:
+    """The settled topics of a log.
+
+    Attributes:
+        topics: all topics with rows; tf rows form a forest.
+        choices: role to the topic that plays it.
+        frames: map, odom, base and the tree.
+        losses: what tf lost on the way.
+    """
+
+    topics: list[TopicRows]
+    choices: dict[str, Choice]
+    frames: Frames
+    losses: list[Loss]
+
+
+def settle_cast(topics: Sequence[TopicRows], overrides: Mapping[str, str]) -> Cast:
+    """Roles and frames of a log.
+
+    Args:
+        topics: rows of all topics.
+        overrides: what the user says, by role and by `*_frame`.
+
+    Raises:
+        UsageError: a topic's type cannot play the role it was given.
+    """
+    tf_rows, tree, losses = settle([t for t in topics if t.table == "transforms"])
+    others = [t for t in topics if t.table != "transforms"]
+    free = _not_given(others, overrides)
+    given = {r: _given(r, n, [*others, *tf_rows]) for r, n in overrides.items() if r in ROLE_TABLES}
+    found: dict[str, Choice | None] = {
+        "odometry": roles.choose_odometry(free("odometry"), tf_rows),
+        "imu": roles.choose_imu(free("imu")),
+        "scan": roles.choose_scan(free("scan")),
+        "reference": roles.choose_reference(free("reference")),
+        "map": roles.choose_map(free("map")),
+        "costmap": roles.choose_costmap(free("costmap")),
+        "particles": roles.choose_particles(free("particles")),
+    }
+    found |= given
+    odometry = found["odometry"]
+    map_frames = _map_frames(others, found)
+    frames = find_frames(tree, odometry.rows if odometry else None, map_frames, overrides)
+    initial = [t for t in free("initial_pose") if roles.is_initial_pose(t)]
+    found |= {
+        "pose": roles.choose_pose([*free("pose"), *tf_rows], frames),
+        "initial_pose": roles.choose_simple(initial, "poses", "named as one", ("initialpose",)),
+        "points": roles.choose_simple(free("points"), "points", "point cloud", ("points",)),
+        "plan": roles.choose_simple(free("plan"), "plans", "nav_msgs/Path", ("plan", "path")),
+        "command": roles.choose_simple(
+            free("command"), "commands", "velocity command", ("cmd_vel", "command")
+        ),
+        "recovery": roles.choose_simple(free("recovery"), "recoveries", "recovery actions", ()),
+    }
+    found |= given
+    pose = found["pose"]
+    if "covariance" not in found and pose is not None and roles.has_covariance(pose.rows):
+        found["covariance"] = Choice(pose.rows, "the pose's own")
+    choices = {role: choice for role, choice in found.items() if choice is not None}
+    return Cast([*others, *tf_rows], choices, frames, losses)
+
+
+def _not_given(topics: Sequence[TopicRows], overrides: Mapping[str, str]):  # type: ignore[no-untyped-def]
+    """Topics a role may choose from: those the user gave to no other role."""
+    pair = {"pose", "covariance"}
+
+    def free(role: str) -> list[TopicRows]:
+        taken = {n for r, n in overrides.items() if r != role and not {r, role} <= pair}
+        return [t for t in topics if t.topic not in taken]
+
+    return free
+
+
+def _given(role: str, name: str, topics: Sequence[TopicRows]) -> Choice:
+    table = ROLE_TABLES[role]
+    fitting = {
+        "references": ("poses", "odometry", "references"),
+        "initial_poses": ("poses",),
+        "poses": ("poses", "odometry", "transforms"),
+        "map_updates": ("costmaps",),
+    }.get(table, (table,))
+    named = [t for t in topics if t.topic == name]
+    rows = next((t for t in named if t.table in fitting), None)
+    if rows is None:
+        types = ", ".join(t.type for t in named) or "nothing"
+        raise UsageError(f"{types} cannot play {role}", where=name)
+    return Choice(rows, "given with --topics")
+
+
+def _map_frames(topics: Sequence[TopicRows], found: Mapping[str, Choice | None]) -> list[str]:
+    """Frames that a localizer's poses, particles or the map itself are in, best first."""
+    estimates = [t for t in topics if t.table == "poses" and is_map_frame(t.frame())]
+    estimates.sort(key=lambda t: ("amcl" not in tokens(t.topic), -t.messages, t.topic))
+    others = [found[role] for role in ("map", "particles")]
+    frames = [t.frame() for t in estimates] + [c.rows.frame() for c in others if c is not None]
+    return list(dict.fromkeys(f for f in frames if f))

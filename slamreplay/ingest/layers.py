@@ -1,0 +1,119 @@
+"""Topics in the tables of their roles, and the map layer of the bundle."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from slamreplay.bundle.manifest import Loss, Source
+from slamreplay.bundle.view import ROLE_TABLES
+from slamreplay.geometry.times import NO_STAMP
+from slamreplay.ingest.cast import Cast
+from slamreplay.ingest.grids import given_map, map_rows, recorded_maps
+from slamreplay.ingest.names import is_reference
+from slamreplay.ingest.roles import Choice, is_costmap, is_estimate, is_initial_pose
+from slamreplay.ingest.rows import TopicRows
+from slamreplay.ingest.tables import moved
+from slamreplay.maps.grid import OccupancyGrid
+
+#: The simulator's truth; every other topic that is named as one was measured.
+SIMULATED_TRUTH = "/slamreplay/reference"
+
+
+@dataclass
+class Layers:
+    """What goes into the bundle, and what did not.
+
+    Attributes:
+        topics: rows, each in the table of its role.
+        grids: source description to map, oldest first.
+        choices: role to topic, the map given by the user included.
+        sources: files read on top of the log.
+        losses: topics without use, maps that were mended.
+    """
+
+    topics: list[TopicRows] = field(default_factory=list)
+    grids: dict[str, OccupancyGrid] = field(default_factory=dict)
+    choices: dict[str, Choice] = field(default_factory=dict)
+    sources: list[Source] = field(default_factory=list)
+    losses: list[Loss] = field(default_factory=list)
+
+
+def lay_out(cast: Cast, map_yaml: Path | None) -> Layers:
+    """Every topic in its table; the map from the yaml, else from the log.
+
+    Raises:
+        MapError: the map cannot be read.
+    """
+    layers = Layers(choices=dict(cast.choices))
+    table_of = {c.rows.topic: ROLE_TABLES[role] for role, c in cast.choices.items()}
+    for topic in cast.topics:
+        reason = _no_use(topic, cast, table_of, map_yaml)
+        if reason is not None:
+            loss = Loss(kind="skipped", what=topic.topic, count=topic.messages, reason=reason)
+            layers.losses.append(loss)
+        elif table_of.get(topic.topic) == "map_updates":
+            grids, versions, losses = recorded_maps(topic)
+            for grid in grids:
+                layers.grids[f"{topic.topic} {len(layers.grids) + 1}"] = grid
+            layers.topics.append(map_rows(topic, versions))
+            layers.losses += losses
+        else:
+            layers.topics.append(_in_its_table(topic, cast, table_of))
+    if map_yaml is not None:
+        _use_given_map(layers, cast, map_yaml)
+    return layers
+
+
+def _no_use(
+    topic: TopicRows, cast: Cast, table_of: Mapping[str, str], map_yaml: Path | None
+) -> str | None:
+    """Why a topic's rows have no place in the bundle, or None."""
+    if topic.topic in table_of:
+        if table_of[topic.topic] == "map_updates" and map_yaml is not None:
+            return "the map given with --map is used instead"
+        return None
+    if topic.table == "costmaps" and not is_costmap(topic):
+        return "a grid that is neither the map nor a costmap"
+    if topic.table == "points":
+        return "another point cloud is used"
+    is_belief = is_estimate(topic, cast.frames) or is_initial_pose(topic)
+    if topic.table == "poses" and not is_belief and not is_reference(topic.topic):
+        return "a pose, but not the robot's in a map"
+    return None
+
+
+def _in_its_table(topic: TopicRows, cast: Cast, table_of: Mapping[str, str]) -> TopicRows:
+    table = table_of.get(topic.topic, topic.table)
+    if topic.table == "transforms":
+        return topic
+    if topic.topic not in table_of and topic.table in ("poses", "odometry"):
+        if is_reference(topic.topic):
+            table = "references"
+        elif is_initial_pose(topic):
+            table = "initial_poses"
+        elif is_estimate(topic, cast.frames):
+            table = "poses"
+    kind = "simulation" if topic.topic == SIMULATED_TRUTH else "motion_capture"
+    return moved(topic, table, kind=kind)
+
+
+def _use_given_map(layers: Layers, cast: Cast, path: Path) -> None:
+    grid, sources, losses = given_map(path, cast.frames.map or "map")
+    layers.sources += sources
+    layers.losses += losses
+    layers.grids = {path.name: grid}
+    # It holds from the log's first moment on.
+    first = min((int(t.t_log_ns[0]) for t in cast.topics if len(t)), default=0)
+    columns = {
+        "map_version": np.array([grid.version], dtype=object),
+        "frame_id": np.array([grid.frame_id], dtype=object),
+    }
+    rows = TopicRows(
+        path.name, "map_server", 1, "map_updates", columns, np.array([NO_STAMP]), np.array([first])
+    )
+    layers.topics.append(rows)
+    layers.choices["map"] = Choice(rows, "given with --map")

@@ -1,0 +1,51 @@
+"""What the names of topics and frames say, whatever namespace they stand in."""
+
+from __future__ import annotations
+
+import re
+
+_TOKENS = re.compile(r"[a-z]+|\d+")
+_CAMEL = re.compile(r"(?<=[a-z0-9])(?=[A-Z])")
+
+
+def tokens(name: str) -> list[str]:
+    """Words of a topic, in order: "/robot1/amcl_pose" gives robot, 1, amcl, pose."""
+    return _TOKENS.findall(_CAMEL.sub("_", name).lower())
+
+
+def basename(name: str) -> str:
+    """The last part of a topic or frame, in lower case: "/robot1/odom" gives "odom"."""
+    return name.rstrip("/").rpartition("/")[2].lower()
+
+
+def namespace(topic: str) -> str:
+    """The first part of a topic that has several: "/robot1/odom" gives "robot1", "/odom" ""."""
+    first, _, rest = topic.strip("/").partition("/")
+    return first if rest else ""
+
+
+def is_map_frame(frame: str) -> bool:
+    """REP-105's map, in whatever namespace; also the `map` part of longer names."""
+    return "map" in tokens(basename(frame))
+
+
+def is_odom_frame(frame: str) -> bool:
+    """REP-105's odom: "odom", "robot1/odom", "odom_combined"."""
+    return any(word.startswith("odom") for word in tokens(basename(frame)))
+
+
+def is_base_frame(frame: str) -> bool:
+    """REP-105's base: "base_link", "base_footprint", "base", in whatever namespace."""
+    words = tokens(basename(frame))
+    return words in (["base"], ["base", "link"], ["base", "footprint"]) or (
+        words[-2:] in (["base", "link"], ["base", "footprint"])
+    )
+
+
+_TRUTH = frozenset({"gt", "groundtruth", "truth", "mocap", "vicon", "vrpn", "optitrack",
+                    "qualisys", "phasespace", "natnet"})  # fmt: skip
+
+
+def is_reference(topic: str) -> bool:
+    """Whether a topic's name claims an independent idea of the truth."""
+    return bool(_TRUTH & set(tokens(topic))) or topic.strip("/") == "slamreplay/reference"

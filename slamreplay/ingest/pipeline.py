@@ -1,0 +1,155 @@
+"""One log in, one bundle out."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+
+from slamreplay.bundle.atomic import refuse_foreign
+from slamreplay.bundle.manifest import Frames, Loss, Manifest, Role, Source
+from slamreplay.bundle.store import MANIFEST, write_bundle
+from slamreplay.bundle.tables import Table
+from slamreplay.bundle.view import Bundle
+from slamreplay.ingest.cast import settle_cast
+from slamreplay.ingest.clock import choose_clock, row_times
+from slamreplay.ingest.layers import lay_out
+from slamreplay.ingest.options import IngestOptions
+from slamreplay.ingest.overrides import check_topics, read_overrides
+from slamreplay.ingest.parts import missing_parts
+from slamreplay.ingest.readers.open_log import open_log
+from slamreplay.ingest.reference_file import read_reference
+from slamreplay.ingest.robots import topic_filter
+from slamreplay.ingest.roles import Choice
+from slamreplay.ingest.rows import TopicRows, read_rows
+from slamreplay.ingest.span import clock_between, cut, evidence_span
+from slamreplay.ingest.tables import build, without_prefix
+
+
+def ingest(
+    logs: Sequence[Path],
+    target: Path,
+    options: IngestOptions = IngestOptions(),  # noqa: B008 - frozen
+    *,
+    progress: Callable[[str, float], None] | None = None,
+) -> Bundle:
+    """Read a log (one container or several files of one log) into the bundle at `target`.
+
+    Args:
+        logs: .bag, .mcap, .db3 files or folders of rosbag2; several are one log.
+        target: the bundle's folder; the same content there already is kept as it is.
+        options: what the user says about the log.
+        progress: told a few words and the share done, 0 to 1.
+
+    Raises:
+        LogError: a file is no log, or there is nothing to work with in it.
+        MapError: the map cannot be read.
+        UsageError: options that do not fit the log.
+        OutputError: the target is somebody else's, or cannot be written.
+    """
+    refuse_foreign(target, MANIFEST)
+    overrides = read_overrides(options.topics)
+    with open_log(logs) as (readers, losses):
+        sources = [s for reader in readers for s in reader.sources]
+        names = [c.topic for reader in readers for c in reader.connections]
+        topics, lost = read_rows(readers, topic_filter(names, options.robot), progress)
+    if options.robot is not None:
+        topics = [without_prefix(t, options.robot.strip("/")) for t in topics]
+    check_topics(overrides, sorted({t.topic for t in topics}), options.topics)
+    cast = settle_cast(topics, overrides)
+    layers = lay_out(cast, options.map)
+    losses = [*losses, *lost, *cast.losses, *layers.losses]
+    sources += layers.sources
+
+    clock = choose_clock(cast.topics)
+    timed = []
+    for topic in layers.topics:
+        t_ns, remarks = row_times(topic, clock)
+        timed.append((topic, t_ns))
+        losses += remarks
+    if options.reference is not None:
+        rows, source, remarks = _survey(options.reference, cast.frames)
+        timed.append((rows, rows.t_sensor_ns))
+        losses += remarks
+        sources.append(source)
+        layers.choices["reference"] = Choice(rows, "given with --reference")
+
+    tables = build(timed)
+    span = evidence_span(tables, cast.frames, logs[0])
+    tables, span = cut(tables, span, options.start_s, options.end_s)
+    if progress is not None:
+        progress("writing", 1.0)
+    manifest = Manifest(
+        bundle_id="",
+        sources=sources,
+        options=_texts(options),
+        start_ns=span[0],
+        end_ns=span[1],
+        clock=clock_between(clock, tables),
+        frames=cast.frames,
+        roles=_roles(layers.choices),
+        missing=missing_parts(_present(layers.choices, tables, cast.frames)),
+        maps=[],
+        losses=_sorted(losses),
+        tables={},
+    )
+    write_bundle(target, manifest, tables, layers.grids)
+    return Bundle.open(target)
+
+
+def _survey(path: Path, frames: Frames) -> tuple[TopicRows, Source, list[Loss]]:
+    rows, losses = read_reference(path, frames.map or "map", frames.base or "base_link")
+    content = path.read_bytes()
+    digest = hashlib.sha256(content).hexdigest()
+    source = Source(name=path.name, format="reference", bytes=len(content), sha256=digest)
+    return rows, source, losses
+
+
+def _texts(options: IngestOptions) -> dict[str, str]:
+    """Options as the manifest keeps them: names without folders."""
+    given = {name: getattr(options, name) for name in sorted(options.__dataclass_fields__)}
+    return {
+        name: value.name if isinstance(value, Path) else f"{value:g}" if name.endswith("_s")
+        else str(value) for name, value in given.items() if value is not None
+    }  # fmt: skip
+
+
+def _roles(choices: Mapping[str, Choice]) -> list[Role]:
+    return [
+        Role(
+            role=role,
+            topic=choice.rows.topic,
+            type=choice.rows.type,
+            messages=choice.rows.messages,
+            reason=choice.reason,
+        )
+        for role, choice in sorted(choices.items())
+    ]
+
+
+def _present(
+    choices: Mapping[str, Choice], tables: Mapping[str, Table], frames: Frames
+) -> set[str]:
+    """The parts of a replay bundle that are there."""
+    named = {"scan": "scans"}
+    present = {named.get(role, role) for role in choices}
+    transforms = tables.get("transforms")
+    if transforms is not None:
+        carried = (transforms["parent_frame"] == frames.odom) & (
+            transforms["child_frame"] == frames.base
+        )
+        if carried.any():
+            present.add("odometry")
+    return present
+
+
+def _sorted(losses: Sequence[Loss]) -> list[Loss]:
+    """Losses of one kind and reason added up, in a fixed order."""
+    counts: dict[tuple[str, str, str], int] = {}
+    for loss in losses:
+        key = (loss.kind, loss.what, loss.reason)
+        counts[key] = counts.get(key, 0) + loss.count
+    return [
+        Loss(kind=kind, what=what, count=count, reason=reason)  # type: ignore[arg-type]
+        for (kind, what, reason), count in sorted(counts.items())
+    ]
