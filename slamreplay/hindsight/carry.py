@@ -58,22 +58,22 @@ def carry(
 
 def scan_scores(field: ScoreField, beams: Beams, poses: se2.Array) -> se2.Array:
     """(N,) mean score of each scan's hits at poses (N, 3); NaN without a hit or a pose."""
-    return np.asarray(
-        _scan_scores(
-            field.values,
-            field.resolution_m,
-            field.corner_xy,
-            beams.ends,
-            beams.kind,
-            np.ascontiguousarray(poses),
-        )
+    out = np.full(len(poses), np.nan)
+    _scan_scores(
+        field.values,
+        field.resolution_m,
+        field.corner_xy,
+        beams.ends,
+        beams.kind,
+        np.ascontiguousarray(poses),
+        out,
     )
+    return out
 
 
 @njit(cache=True)
-def _scan_scores(values, resolution, corner, ends, kind, poses):  # type: ignore[no-untyped-def]
+def _scan_scores(values, resolution, corner, ends, kind, poses, out):  # type: ignore[no-untyped-def]
     height, width = values.shape
-    out = np.full(poses.shape[0], np.nan)
     for s in range(poses.shape[0]):
         if not np.isfinite(poses[s, 0]):
             continue
@@ -91,4 +91,3 @@ def _scan_scores(values, resolution, corner, ends, kind, poses):  # type: ignore
                 total += values[row, col]
         if count:
             out[s] = total / count
-    return out

@@ -9,7 +9,16 @@ from scipy.ndimage import binary_dilation, distance_transform_edt, label
 from slamreplay.bundle.products import ChangedRegion, Changes
 from slamreplay.geometry import se2
 from slamreplay.hindsight.beams import INVALID, Beams
-from slamreplay.hindsight.evidence import Evidence, classify, gather
+from slamreplay.hindsight.changed_beams import (
+    APPEARED,
+    NEW,
+    REMOVED,
+    SUPPORTED,
+    UNKNOWN,
+    WALL,
+    changed_beams,
+)
+from slamreplay.hindsight.evidence import Evidence, gather
 from slamreplay.maps.grid import OccupancyGrid
 from slamreplay.matching.field import WorkingMap
 
@@ -36,36 +45,27 @@ def find_changes(
     """
     poses = np.ascontiguousarray(poses)
     evidence = gather(working, beams, poses)
-    distance, new, support = _structure(working, evidence)
-    change, where = classify(
-        working.walls,
-        working.unknown,
-        distance,
-        new,
-        support,
-        working.resolution_m,
-        working.corner_xy,
-        beams.ends,
-        beams.kind,
-        beams.laser_xy,
-        poses,
-        BEYOND_M,
+    cells = _cell_bits(working, evidence)
+    change, where = changed_beams(
+        cells, working.resolution_m, working.corner_xy, beams, poses, BEYOND_M
     )
     valid = np.count_nonzero(beams.kind != INVALID, axis=1).astype(np.float64)
     valid[(valid == 0) | ~np.isfinite(poses).all(axis=1)] = np.nan
-    appeared_share = np.count_nonzero(change == 1, axis=1) / valid
-    removed_share = np.count_nonzero(change == 2, axis=1) / valid
-    cells = [_cells(working, where[change == code]) for code in (1, 2)]
-    cells[1] |= working.walls & _fine(working, evidence.pass_s >= GONE_S, evidence.step) & ~support
+    appeared_share = np.count_nonzero(change == APPEARED, axis=1) / valid
+    removed_share = np.count_nonzero(change == REMOVED, axis=1) / valid
+    appeared = _mask(cells, where[change == APPEARED])
+    passed = _fine(working, evidence.pass_s >= GONE_S, evidence.step)
+    removed = _mask(cells, where[change == REMOVED])
+    removed |= working.walls & passed & ((cells & SUPPORTED) == 0)
     regions = [
         region
-        for kind, code, mask in (("appeared", 1, cells[0]), ("removed", 2, cells[1]))
+        for kind, code, mask in (("appeared", APPEARED, appeared), ("removed", REMOVED, removed))
         for region in _regions(working, evidence, beams.t_ns, change == code, where, mask, kind)
     ]
     regions.sort(key=lambda r: (-r.area_m2, r.bbox_m))
     return Changes(
-        _to_grid(grid, working, cells[0]),
-        _to_grid(grid, working, cells[1]) & grid.occupied,
+        _to_grid(grid, working, appeared),
+        _to_grid(grid, working, removed) & grid.occupied,
         tuple(regions),
         beams.t_ns,
         appeared_share + removed_share,
@@ -74,19 +74,22 @@ def find_changes(
     )
 
 
-def _structure(
-    working: WorkingMap, evidence: Evidence
-) -> tuple[NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_]]:
-    """Distance to mapped walls; where beams may end on standing structure; what it supports."""
-    distance = distance_transform_edt(~working.walls) * working.resolution_m
-    standing = (evidence.hit_s >= STANDING_S) & (evidence.pass_s <= PASSES_PER_HIT * evidence.hit_s)
+def _cell_bits(working: WorkingMap, evidence: Evidence) -> NDArray[np.uint8]:
+    """(H, W) what the map and the evidence say of each cell."""
+    hit_s, pass_s = evidence.hit_s, evidence.pass_s
+    standing = (hit_s >= STANDING_S) & (pass_s <= PASSES_PER_HIT * hit_s)
     near = binary_dilation(standing, np.ones((3, 3), dtype=bool))
-    # A mapped wall counts as there as soon as anything at all was seen on it more than through it:
-    # far walls and dark ones are seen too seldom to be called standing.
-    seen = (evidence.hit_s > 0.0) & (evidence.hit_s >= 0.5 * evidence.pass_s)
-    fine_seen = _fine(working, standing | seen, evidence.step)
-    apart = distance_transform_edt(~fine_seen) if fine_seen.any() else np.full(distance.shape, 1e9)
-    return distance, _fine(working, near, evidence.step), apart * working.resolution_m <= BEYOND_M
+    apart_m = distance_transform_edt(~working.walls) * working.resolution_m
+    # A mapped wall counts as there as soon as more was seen on it than through it: far walls and
+    # dark ones are hit too seldom to be called standing.
+    seen = standing | ((hit_s > 0.0) & (hit_s >= 0.5 * pass_s))
+    seen = _fine(working, seen, evidence.step)
+    seen_m = distance_transform_edt(~seen) * working.resolution_m if seen.any() else np.inf
+    bits = np.zeros(working.walls.shape, dtype=np.uint8)
+    bits |= WALL * working.walls.astype(np.uint8) | UNKNOWN * working.unknown.astype(np.uint8)
+    bits |= NEW * (_fine(working, near, evidence.step) & (apart_m > BEYOND_M)).astype(np.uint8)
+    bits |= SUPPORTED * np.broadcast_to(seen_m <= BEYOND_M, bits.shape).astype(np.uint8)
+    return bits
 
 
 def _fine(working: WorkingMap, mask: NDArray[np.bool_], step: int) -> NDArray[np.bool_]:
@@ -94,10 +97,10 @@ def _fine(working: WorkingMap, mask: NDArray[np.bool_], step: int) -> NDArray[np
     return np.repeat(np.repeat(mask, step, axis=0), step, axis=1)[:height, :width]
 
 
-def _cells(working: WorkingMap, index: NDArray[np.int32]) -> NDArray[np.bool_]:
-    mask = np.zeros(working.walls.size, dtype=bool)
+def _mask(cells: NDArray[np.uint8], index: NDArray[np.int32]) -> NDArray[np.bool_]:
+    mask = np.zeros(cells.size, dtype=bool)
     mask[index] = True
-    return mask.reshape(working.walls.shape)
+    return mask.reshape(cells.shape)
 
 
 def _regions(

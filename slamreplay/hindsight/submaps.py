@@ -81,15 +81,16 @@ def blocked_share(working: WorkingMap, submap: Submap, poses: se2.Array) -> se2.
     rays[..., :2] = se2.transform_points(poses, submap.rays[:, :2])
     rays[..., 2:] = se2.transform_points(poses, submap.rays[:, 2:])
     rays -= np.tile(working.corner_xy, 2)
-    blocked = _blocked(working.walls, rays / working.resolution_m, SHORT_M / working.resolution_m)
+    blocked = np.zeros(rays.shape[:2], dtype=bool)
+    cell = working.resolution_m
+    _blocked(working.walls, rays / cell, SHORT_M / cell, blocked)
     return np.asarray(blocked.mean(axis=1)) if rays.size else np.zeros(len(poses))
 
 
 @njit(cache=True)
-def _blocked(walls, rays, short):  # type: ignore[no-untyped-def]
+def _blocked(walls, rays, short, out):  # type: ignore[no-untyped-def]
     """Which rays (K, R, 4), in cells, cross a wall more than `short` cells before their end."""
     height, width = walls.shape
-    out = np.zeros(rays.shape[:2], dtype=np.bool_)
     for k in range(rays.shape[0]):
         for r in range(rays.shape[1]):
             x, y = rays[k, r, 0], rays[k, r, 1]
@@ -102,7 +103,6 @@ def _blocked(walls, rays, short):  # type: ignore[no-untyped-def]
                 if 0 <= row < height and 0 <= col < width and walls[row, col]:
                     out[k, r] = True
                     break
-    return out
 
 
 def owners(found: Sequence[Submap], count: int) -> NDArray[np.int64]:

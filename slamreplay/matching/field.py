@@ -106,17 +106,18 @@ def points_field(
     corner = np.floor((points.min(axis=0) - margin) / resolution_m) * resolution_m
     extent = np.ceil((points.max(axis=0) + margin - corner) / resolution_m).astype(np.int64) + 1
     values = np.zeros((int(extent[1]), int(extent[0])), dtype=np.float32)
-    _splat(values, (points - corner) / resolution_m, sigma_m / resolution_m)
+    sigma = sigma_m / resolution_m
+    fall_x = np.empty(2 * int(np.ceil(3.0 * sigma)) + 1, dtype=np.float32)
+    _splat(values, (points - corner) / resolution_m, sigma, fall_x)
     return ScoreField(values, resolution_m, corner)
 
 
 @njit(cache=True)
-def _splat(values, cells, sigma):  # type: ignore[no-untyped-def]
+def _splat(values, cells, sigma, fall_x):  # type: ignore[no-untyped-def]
     """Write the largest exp(-d^2 / 2 sigma^2) over all points into each cell; all in cells."""
     height, width = values.shape
     reach = int(np.ceil(3.0 * sigma))
     scale = -0.5 / (sigma * sigma)
-    fall_x = np.empty(2 * reach + 1, dtype=np.float32)
     for k in range(cells.shape[0]):
         col, row = int(cells[k, 0]), int(cells[k, 1])
         for j in range(2 * reach + 1):

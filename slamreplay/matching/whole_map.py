@@ -143,18 +143,19 @@ def _score_lattice(
     height, width = padded.shape[0] - 2 * reach, padded.shape[1] - 2 * reach
     best = np.zeros((len(headings) // per_sector, height, width), dtype=np.uint16)
     which = np.zeros(best.shape, dtype=np.uint8)
-    _add_rows(padded, reach, cells, headings, per_sector, best, which)
+    total = np.zeros(width, dtype=np.uint16)
+    offset = np.zeros(len(cells), dtype=np.int64)
+    flat, padded_width = padded.ravel(), padded.shape[1]
+    _add_rows(flat, padded_width, reach, cells, headings, per_sector, best, which, total, offset)
     return best, which
 
 
 @njit(cache=True)
-def _add_rows(padded, reach, cells, headings, per_sector, best, which):  # type: ignore[no-untyped-def]
+def _add_rows(  # type: ignore[no-untyped-def]  # noqa: C901
+    flat, padded_width, reach, cells, headings, per_sector, best, which, total, offset
+):
     height, width = best.shape[1], best.shape[2]
     count = cells.shape[0]
-    padded_width = padded.shape[1]
-    flat = padded.ravel()
-    total = np.empty(width, dtype=np.uint16)
-    offset = np.zeros(count + 3, dtype=np.int64)
     full = count - count % 4
     for h in range(headings.shape[0]):
         cos, sin = np.cos(headings[h]), np.sin(headings[h])
@@ -166,7 +167,8 @@ def _add_rows(padded, reach, cells, headings, per_sector, best, which):  # type:
         sector, part = h // per_sector, np.uint8(h % per_sector)
         for row in range(height):
             start = row * padded_width
-            total[:] = 0
+            for i in range(width):
+                total[i] = 0
             for p in range(0, full, 4):
                 a = flat[start + offset[p] : start + offset[p] + width]
                 b = flat[start + offset[p + 1] : start + offset[p + 1] + width]
