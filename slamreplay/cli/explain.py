@@ -1,0 +1,46 @@
+"""`slamreplay explain`: what a finding means."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+from difflib import get_close_matches
+from textwrap import fill
+from typing import Annotated
+
+import typer
+
+from slamreplay.bundle.findings import FINDINGS
+from slamreplay.cli.options import Json
+from slamreplay.errors import UsageError
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command."""
+    app.command(name="explain", help="Say what a finding asks, how, and when it misleads.")(
+        _explain
+    )
+
+
+def _explain(
+    id_: Annotated[str, typer.Argument(metavar="ID", help="A finding's id, as SR-LOC-001.")],
+    as_json: Json = False,
+) -> None:
+    known = {name.lower(): name for name in FINDINGS}
+    if id_.lower() not in known:
+        near = get_close_matches(id_.upper(), FINDINGS, n=1)
+        hint = f"did you mean '{near[0]}'?" if near else "'slamreplay list findings' has them all"
+        raise UsageError(f"there is no finding '{id_}'", hint=hint)
+    name = known[id_.lower()]
+    explanation = FINDINGS[name]
+    if as_json:
+        typer.echo(json.dumps({"id": name, **asdict(explanation)}, indent=1))
+        return
+    typer.echo(f"{name}  {explanation.title}")
+    for head, text in (
+        ("it asks", explanation.asks),
+        ("how", explanation.method),
+        ("it misleads", explanation.misleads),
+    ):
+        indent = " " * 14
+        typer.echo(fill(text, 100, initial_indent=f"  {head:<12}", subsequent_indent=indent))

@@ -1,0 +1,155 @@
+"""`slamreplay report`: verdict and evidence of one log."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from slamreplay.bundle.findings import SEVERITIES, Severity
+from slamreplay.cli.options import (
+    End,
+    Json,
+    MapYaml,
+    Reference,
+    Robot,
+    Start,
+    Topics,
+    evidence,
+    ingest_options,
+)
+from slamreplay.errors import UsageError
+
+if TYPE_CHECKING:
+    from slamreplay.bundle.run import Run
+    from slamreplay.bundle.view import Bundle
+    from slamreplay.ingest.options import IngestOptions
+    from slamreplay.report.evidence import Postmortem
+
+Evidence = Annotated[
+    list[Path],
+    typer.Argument(
+        metavar="LOG...",
+        help="A log (several files are one log), a bundle, or a folder of runs from perturb.",
+    ),
+]
+Output = Annotated[
+    Path,
+    typer.Option("-o", "--output", metavar="DIR", help="Where report.html and its kin go."),
+]
+FailOn = Annotated[
+    str | None,
+    typer.Option(
+        "--fail-on",
+        metavar="SEVERITY",
+        help="Exit with 1 on findings of info, warning or error, and of what is worse.",
+    ),
+]
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command."""
+    app.command(name="report", help="Say whether the robot was lost or the map had changed.")(
+        _report
+    )
+
+
+def _report(
+    logs: Evidence,
+    output: Output,
+    map_yaml: MapYaml = None,
+    topics: Topics = None,
+    robot: Robot = None,
+    reference: Reference = None,
+    start_s: Start = None,
+    end_s: End = None,
+    fail_on: FailOn = None,
+    as_json: Json = False,
+) -> None:
+    from slamreplay.bundle.atomic import refuse_foreign
+
+    threshold = _severity(fail_on)
+    refuse_foreign(output, "report.json")  # before the work, not after it
+    options = ingest_options(
+        map_yaml=map_yaml,
+        topics=topics,
+        robot=robot,
+        reference=reference,
+        start_s=start_s,
+        end_s=end_s,
+    )
+    with _evidence(logs, options) as (bundle, runs):
+        from slamreplay.cli.progress import progress_bar
+        from slamreplay.postmortem import postmortem
+        from slamreplay.report.build import build
+        from slamreplay.report.writer import write_report
+
+        with progress_bar("looking back") as progress:
+            post = postmortem(bundle, runs, progress=progress)
+            page = write_report(post, output)
+    if as_json:
+        typer.echo(build(post).json_text(), nl=False)
+    else:
+        _summarise(post, page)
+    if threshold is not None and any(f.severity in _from(threshold) for f in post.findings):
+        raise typer.Exit(1)
+
+
+@contextmanager
+def _evidence(logs: Sequence[Path], options: IngestOptions) -> Iterator[tuple[Bundle, list[Run]]]:
+    from slamreplay.ingest.options import IngestOptions
+    from slamreplay.replay.folder import is_runs, read_runs
+
+    if len(logs) == 1 and is_runs(logs[0]):
+        if options != IngestOptions():
+            raise UsageError(
+                "a folder of runs takes no options of a log",
+                where=logs[0],
+                hint="its bundle was ingested already",
+            )
+        yield read_runs(logs[0])
+        return
+    with evidence(logs, options) as bundle:
+        yield bundle, []
+
+
+def _summarise(post: Postmortem, page: Path) -> None:
+    """The answer in a few lines; the page's path comes last, alone, for scripts and terminals."""
+    from rich.console import Console
+    from rich.text import Text
+
+    from slamreplay.report.phrases import percent
+    from slamreplay.report.words import FAILURE_MODES, STATES
+
+    judgement = post.judgement
+    console = Console(highlight=False, soft_wrap=True)
+    colour = {"healthy": "green", "lost": "red", "lost_and_map_changed": "red"}
+    verdict = Text(judgement.state, style=f"bold {colour.get(judgement.state, 'yellow')}")
+    sure = "" if judgement.confidence is None else f", confidence {percent(judgement.confidence)}"
+    console.print(verdict, Text(f"({STATES[judgement.state].meaning}{sure})"))
+    console.print(Text(judgement.summary))
+    mode = judgement.failure_mode
+    if mode.kind != "none":
+        console.print(Text(f"failure mode: {FAILURE_MODES[mode.kind]}"))
+    missing = post.manifest.missing_parts()
+    if missing:
+        console.print(Text(f"missing: {', '.join(missing)}", style="dim"))
+    counts = {s: sum(f.severity == s for f in post.findings) for s in reversed(SEVERITIES)}
+    console.print(Text(f"findings: {', '.join(f'{n} {s}' for s, n in counts.items())}"))
+    console.print(Text(str(page)))
+
+
+def _severity(text: str | None) -> Severity | None:
+    if text is None:
+        return None
+    for severity in SEVERITIES:
+        if text == severity:
+            return severity
+    raise UsageError(f"there is no severity '{text}'", hint=f"there are: {', '.join(SEVERITIES)}")
+
+
+def _from(threshold: Severity) -> tuple[Severity, ...]:
+    return SEVERITIES[SEVERITIES.index(threshold) :]

@@ -1,0 +1,105 @@
+"""One log in, one post-mortem out: the composition that every command calls."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from slamreplay.bundle.belief import recorded_belief
+from slamreplay.bundle.findings import SEVERITIES, Finding
+from slamreplay.bundle.odometry import odometry_track
+from slamreplay.bundle.run import Run
+from slamreplay.bundle.view import Bundle, BundleView
+from slamreplay.consistency import CHECKS
+from slamreplay.consistency.context import CheckContext
+from slamreplay.consistency.credibility import nees_of_belief
+from slamreplay.consistency.references import best_reference, unused_references
+from slamreplay.hindsight.pipeline import hindsight
+from slamreplay.replay.metrics import trial_metrics
+from slamreplay.report.evidence import Postmortem, TrialResult
+from slamreplay.report.metrics import run_metrics
+from slamreplay.verdict.judge import judge
+from slamreplay.verdict.limits import Limits
+
+__all__ = ["Postmortem", "belief_times", "postmortem"]
+
+#: Share of the progress bar that hindsight takes: nearly all the time goes there.
+_HINDSIGHT_SHARE = 0.9
+
+
+def postmortem(
+    bundle: Bundle,
+    runs: Sequence[Run] = (),
+    *,
+    limits: Limits | None = None,
+    progress: Callable[[str, float], None] | None = None,
+) -> Postmortem:
+    """Look back on one log.
+
+    Hindsight and verdict get the view, in which references that only judge are hidden; NEES and
+    trial metrics are measured against the best reference of the bundle.
+
+    Args:
+        bundle: the log.
+        runs: trials on the same bundle, to be laid beside each other.
+        limits: thresholds of the verdict; the defaults are design's.
+        progress: told what is being done, and the share done from 0 to 1.
+    """
+    limits = Limits() if limits is None else limits
+    say = progress or (lambda _what, _share: None)
+    view = bundle.view()
+    found = hindsight(view, progress=lambda what, share: say(what, _HINDSIGHT_SHARE * share))
+    say("verdict", _HINDSIGHT_SHARE)
+    belief = recorded_belief(view, belief_times(view))
+    judgement = judge(view, belief, found, limits)
+    say("checks", 0.95)
+    best = best_reference(bundle, found)
+    reference, kind = (None, None) if best is None else best
+    context = CheckContext(belief, reference, kind, view)
+    findings = [*judgement.findings, *unused_references(bundle)]
+    for name in CHECKS:
+        findings += CHECKS.load(name)(context)
+    track = None if found is None else found.track
+    trials = tuple(
+        TrialResult(
+            run,
+            {
+                **trial_metrics(run, runs, bundle),
+                **run_metrics(run, track, reference, limits),
+            },
+        )
+        for run in runs
+    )
+    say("done", 1.0)
+    return Postmortem(
+        manifest=bundle.manifest,
+        grid=view.grid,
+        belief=belief,
+        hindsight=found,
+        reference=reference,
+        reference_kind=kind,
+        judgement=judgement,
+        findings=_worst_first(findings),
+        limits=limits,
+        odometry=odometry_track(view),
+        nees=nees_of_belief(context),
+        trials=trials,
+    )
+
+
+def belief_times(view: BundleView) -> NDArray[np.int64]:
+    """(N,) sorted times at which the belief is asked for: scans, else odometry, else poses."""
+    for role in ("scan", "odometry", "pose"):
+        table = view.role(role)
+        if table is not None and len(table):
+            return np.sort(table.t_ns)
+    track = odometry_track(view)
+    return np.zeros(0, dtype=np.int64) if track is None else np.sort(track.t_ns)
+
+
+def _worst_first(findings: Sequence[Finding]) -> tuple[Finding, ...]:
+    """By severity; within one severity the verdict's own come first, then in the checks' order."""
+    unique = list(dict.fromkeys(findings))
+    return tuple(sorted(unique, key=lambda f: -SEVERITIES.index(f.severity)))

@@ -1,0 +1,98 @@
+"""What the writers are given: every stage's product, side by side."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from slamreplay.bundle.findings import Finding
+from slamreplay.bundle.manifest import Manifest
+from slamreplay.bundle.products import Hindsight
+from slamreplay.bundle.run import Run
+from slamreplay.bundle.track import PoseTrack
+from slamreplay.consistency.nees import Nees
+from slamreplay.geometry import se2
+from slamreplay.geometry.times import seconds_since
+from slamreplay.maps.grid import OccupancyGrid
+from slamreplay.verdict.judgement import Judgement
+from slamreplay.verdict.limits import Limits
+
+
+@dataclass(frozen=True, eq=False)
+class TrialResult:
+    """A run and what it was worth: numbers by name, with the unit in the name."""
+
+    run: Run
+    metrics: Mapping[str, float | None] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class Postmortem:
+    """One log, looked back on.
+
+    Attributes:
+        manifest: what the log had and lacked.
+        grid: the map, None without one.
+        belief: what the robot believed at each scan, None where no localizer spoke.
+        hindsight: where it really was, None where that cannot be rebuilt.
+        reference: what NEES and trial metrics are measured against, None without any.
+        reference_kind: simulation, motion_capture, ... or hindsight.
+        judgement: the verdict with its intervals, stops and actions.
+        findings: those of the verdict and of every check, worst first.
+        limits: the thresholds the verdict was found with.
+        odometry: the path by odometry alone, drawn where nothing better is known.
+        nees: of the belief at its own updates, None without covariance or reference.
+        trials: perturbation trials, baseline first.
+    """
+
+    manifest: Manifest
+    grid: OccupancyGrid | None
+    belief: PoseTrack | None
+    hindsight: Hindsight | None
+    reference: PoseTrack | None
+    reference_kind: str | None
+    judgement: Judgement
+    findings: tuple[Finding, ...]
+    limits: Limits
+    odometry: PoseTrack | None = None
+    nees: Nees | None = None
+    trials: tuple[TrialResult, ...] = ()
+
+    def seconds(self, t_ns: ArrayLike) -> se2.Array:
+        """Seconds since the log's start, for text and figures."""
+        return seconds_since(t_ns, self.manifest.start_ns)
+
+    @cached_property
+    def error(self) -> BeliefError | None:
+        """Belief against hindsight at the belief's times, None without either."""
+        if self.belief is None or self.hindsight is None:
+            return None
+        where = self.hindsight.track.at(self.belief.t_ns)
+        step = self.belief.xyyaw - where.xyyaw
+        return BeliefError(
+            self.belief.t_ns,
+            np.hypot(step[:, 0], step[:, 1]),
+            np.abs(se2.wrap_angle(step[:, 2])),
+            where,
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class BeliefError:
+    """How far the belief was from hindsight.
+
+    Attributes:
+        t_ns: (N,) times.
+        distance_m: (N,) m, NaN where either is unknown.
+        heading_rad: (N,) rad, not negative.
+        where: (N,) hindsight's pose at these times.
+    """
+
+    t_ns: NDArray[np.int64]
+    distance_m: se2.Array
+    heading_rad: se2.Array
+    where: PoseTrack

@@ -1,0 +1,1 @@
+"""The report's pictures: drawn by matplotlib, one module per picture, no global state."""

@@ -1,0 +1,133 @@
+"""Paper and ink: the palette, axes that carry units, and a figure as deterministic SVG bytes."""
+
+from __future__ import annotations
+
+import io
+import re
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_svg import FigureCanvasSVG
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from slamreplay.geometry.se2 import Array
+
+#: Okabe and Ito's colours, told apart with every common kind of colour blindness.
+BLUE, SKY, GREEN, YELLOW = "#0072B2", "#56B4E9", "#009E73", "#F0E442"
+ORANGE, VERMILLION, PURPLE = "#E69F00", "#D55E00", "#CC79A7"
+INK, FAINT, RULE = "#22272b", "#6b7278", "#dfe1dc"
+
+#: Beams and cells that contradict the map: the family of the state's own colour.
+APPEARED, REMOVED = ORANGE, YELLOW
+
+STATE_COLOURS = {
+    "healthy": GREEN,
+    "lost": VERMILLION,
+    "map_changed": ORANGE,
+    "lost_and_map_changed": PURPLE,
+    "unobservable": SKY,
+    "insufficient_data": "#9aa0a6",
+}
+
+#: Inches: a desktop column, the half of it beside the facts, and a phone.
+WIDE, BESIDE, NARROW = 11.0, 7.4, 3.9
+
+_STYLE: dict[Any, Any] = {
+    "svg.hashsalt": "slamreplay",  # else ids are random
+    "svg.fonttype": "none",  # text stays text
+    "font.family": "DejaVu Sans",  # ships with matplotlib: the same layout on every machine
+}
+_FONTS = "system-ui, -apple-system, 'Segoe UI', Roboto, 'Helvetica Neue', Arial, 'DejaVu Sans'"
+
+
+@contextmanager
+def plain_style() -> Iterator[None]:
+    """Draw and save inside this: the user's own matplotlibrc does not reach the report."""
+    with mpl.rc_context():
+        mpl.rcdefaults()
+        mpl.rcParams.update(_STYLE)
+        yield
+
+
+def new_figure(width_in: float, height_in: float) -> Figure:
+    """An empty figure that lays itself out."""
+    return Figure(figsize=(width_in, height_in), layout="constrained", facecolor="white")
+
+
+def text_size(width_in: float) -> float:
+    """Points: smaller where the paper is."""
+    return 8.0 if width_in < 5.0 else 9.5
+
+
+def dress(axes: Axes, x: str, y: str, size: float) -> None:
+    """Labels with units, quiet ticks, no box."""
+    axes.set_xlabel(x, fontsize=size, color=INK)
+    axes.set_ylabel(y, fontsize=size, color=INK)
+    axes.tick_params(labelsize=size - 0.5, colors=FAINT, length=3, width=0.6)
+    for side in ("top", "right"):
+        axes.spines[side].set_visible(False)
+    for side in ("left", "bottom"):
+        axes.spines[side].set_color(RULE)
+    axes.grid(visible=True, color=RULE, linewidth=0.6, zorder=0)
+    axes.set_axisbelow(True)
+
+
+def legend(figure: Figure, handles: Iterable[object], size: float, columns: int) -> None:
+    """One legend under the axes, where it hides nothing."""
+    figure.legend(
+        handles=list(handles),
+        loc="outside lower center",
+        ncols=columns,
+        fontsize=size,
+        frameon=False,
+        labelcolor=INK,
+        handlelength=1.8,
+        columnspacing=1.6,
+    )
+
+
+def svg_bytes(figure: Figure) -> bytes:
+    """The figure as SVG: same figure, same bytes."""
+    sink = io.BytesIO()
+    metadata = {"Date": None, "Creator": None, "Format": None, "Type": None}
+    FigureCanvasSVG(figure).print_figure(sink, format="svg", dpi=150, metadata=metadata)
+    text = sink.getvalue().decode().replace("'DejaVu Sans'", _FONTS)
+    return _PATH.sub(_shortened, text).encode()
+
+
+# Hundredths of a point cannot be seen, and make up half of the file.
+_PATH = re.compile(r' d="([^"]*)"')
+_DECIMALS = re.compile(r"(\.\d\d)\d+")
+
+
+def _shortened(path: re.Match[str]) -> str:
+    short = _DECIMALS.sub(r"\1", path.group(1)).replace(" \n", "\n").rstrip()
+    return f' d="{short}"'
+
+
+def thinned(t: Array, y: Array, most: int = 1200) -> tuple[Array, Array]:
+    """A curve with no more than about `most` points that keeps every peak and every gap.
+
+    Of each run of samples the lowest and the highest stay, in order; a run without numbers stays
+    as one NaN.
+    """
+    if len(t) <= most:
+        return t, y
+    keep: list[int] = []
+    for run in np.array_split(np.arange(len(t)), most // 2):
+        known = run[np.isfinite(y[run])]
+        if len(known):
+            keep += sorted({int(known[np.argmin(y[known])]), int(known[np.argmax(y[known])])})
+        else:
+            keep.append(int(run[0]))
+    return t[keep], y[keep]
+
+
+def strided(rows: NDArray, most: int = 2500) -> NDArray:
+    """Every k-th row, so that about `most` stay; for paths, where no sample is a peak."""
+    return rows[:: max(1, -(-len(rows) // most))]

@@ -1,0 +1,101 @@
+"""The course of the log: error, heading and changed beams over one time axis, states behind."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+from slamreplay.report.evidence import Postmortem
+from slamreplay.report.figures import canvas
+from slamreplay.report.figures.canvas import APPEARED, BLUE, FAINT, INK, REMOVED, STATE_COLOURS
+from slamreplay.report.words import STATES
+
+
+def course_figure(post: Postmortem, width_in: float) -> Figure | None:
+    """Error over time with state bands and the share of changed beams; None without either."""
+    changes = None if post.hindsight is None else post.hindsight.changes
+    rows = ([] if post.error is None else [_distance, _heading]) + (
+        [] if changes is None else [_changed]
+    )
+    if not rows:
+        return None
+    size = canvas.text_size(width_in)
+    figure = canvas.new_figure(width_in, 1.75 * len(rows) + 0.9)
+    every = figure.subplots(len(rows), 1, sharex=True, squeeze=False)[:, 0]
+    end_s = float(post.seconds(np.int64(post.manifest.end_ns)))
+    for axes, draw in zip(every, rows, strict=True):
+        last = axes is every[-1]
+        canvas.dress(axes, "time since start [s]" if last else "", draw(axes, post), size)
+        axes.set_xlim(0.0, max(end_s, 1e-3))
+        _bands(axes, post)
+    seen = dict.fromkeys(i.state for i in post.judgement.intervals)
+    handles: list[object] = [
+        Patch(color=STATE_COLOURS[s], alpha=0.35, label=STATES[s].name) for s in seen
+    ]
+    handles.append(Line2D([], [], color=INK, ls="--", lw=1.0, label="limit"))
+    if changes is not None:
+        handles += [
+            Patch(facecolor=APPEARED, edgecolor=FAINT, lw=0.6, label="stands there, not mapped"),
+            Patch(facecolor=REMOVED, edgecolor=FAINT, lw=0.6, label="mapped, but gone"),
+        ]
+    if post.judgement.stops:
+        handles.append(Line2D([], [], color=INK, ls=":", lw=1.2, label="unplanned stop"))
+    canvas.legend(figure, handles, size, columns=2 if width_in < 5.0 else 5)
+    return figure
+
+
+def _bands(axes: Axes, post: Postmortem) -> None:
+    for interval in post.judgement.intervals:
+        start, end = post.seconds(np.array([interval.start_ns, interval.end_ns]))
+        colour = STATE_COLOURS[interval.state]
+        alpha = 0.07 if interval.state == "healthy" else 0.22
+        axes.axvspan(start, end, color=colour, alpha=alpha, linewidth=0.0, zorder=0)
+    for stop in post.judgement.stops:
+        at_s = float(post.seconds(np.int64(stop.t_ns)))
+        axes.axvline(at_s, color=INK, linestyle=":", linewidth=1.2, zorder=3)
+
+
+def _limit(axes: Axes, value: float) -> None:
+    axes.axhline(value, color=INK, linestyle="--", linewidth=1.0, zorder=3)
+
+
+def _curve(axes: Axes, post: Postmortem, values: np.ndarray, limit: float) -> None:
+    assert post.error is not None
+    t, y = canvas.thinned(post.seconds(post.error.t_ns), values)
+    axes.plot(t, y, color=BLUE, linewidth=1.4, zorder=4)
+    _limit(axes, limit)
+    top = np.nanmax(y) if np.isfinite(y).any() else 0.0
+    axes.set_ylim(0.0, 1.15 * max(float(top), limit))
+
+
+def _distance(axes: Axes, post: Postmortem) -> str:
+    assert post.error is not None
+    _curve(axes, post, post.error.distance_m, post.limits.position_m)
+    return "belief off by [m]"
+
+
+def _heading(axes: Axes, post: Postmortem) -> str:
+    assert post.error is not None
+    limit = np.degrees(post.limits.yaw_rad)
+    _curve(axes, post, np.degrees(post.error.heading_rad), float(limit))
+    return "heading off by [deg]"
+
+
+def _changed(axes: Axes, post: Postmortem) -> str:
+    changes = None if post.hindsight is None else post.hindsight.changes
+    assert changes is not None
+    t = post.seconds(changes.t_ns)
+    appeared = 100.0 * np.nan_to_num(changes.appeared_share)
+    total = 100.0 * np.nan_to_num(changes.changed_share)
+    _, high = canvas.thinned(t, total)
+    keep = np.arange(len(t)) if len(t) <= 1200 else np.linspace(0, len(t) - 1, 1200).astype(int)
+    axes.fill_between(t[keep], 0.0, appeared[keep], color=APPEARED, linewidth=0.0, zorder=2)
+    axes.fill_between(t[keep], appeared[keep], total[keep], color=REMOVED, linewidth=0.0, zorder=2)
+    unknown = ~np.isfinite(changes.changed_share)
+    axes.plot(t[unknown], np.zeros(unknown.sum()), "|", color=FAINT, ms=4, zorder=3)
+    _limit(axes, 100.0 * post.limits.changed_share)
+    axes.set_ylim(0.0, 1.15 * max(float(high.max(initial=0.0)), 100.0 * post.limits.changed_share))
+    return "changed beams [%]"

@@ -1,0 +1,242 @@
+"""The map with both paths, where they part, and what of the map is not true."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import to_rgb
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch, Rectangle
+from matplotlib.transforms import Affine2D
+from numpy.typing import NDArray
+
+from slamreplay.bundle.products import ChangedRegion
+from slamreplay.geometry import se2
+from slamreplay.maps.grid import OccupancyGrid
+from slamreplay.report.evidence import Postmortem
+from slamreplay.report.figures import canvas
+from slamreplay.report.figures.canvas import APPEARED, BLUE, FAINT, INK, REMOVED, VERMILLION
+
+_MARGIN_M = 2.5
+
+
+def map_figure(post: Postmortem, width_in: float) -> Figure | None:
+    """Believed and hindsight path on the map; None where no path is known at all."""
+    paths = [p for p in (_path(post, "hindsight"), _path(post, "belief")) if p is not None]
+    alone = _path(post, "odometry") if not paths else None
+    if alone is not None:
+        paths = [alone]
+    if not paths:
+        return None
+    low, high = _window(post, paths)
+    size = canvas.text_size(width_in)
+    aspect = (high[1] - low[1]) / (high[0] - low[0])
+    figure = canvas.new_figure(width_in, float(np.clip(width_in * aspect, 2.0, 6.6)) + 1.1)
+    axes = figure.add_subplot()
+    handles: list[object] = []
+    if post.grid is not None and alone is None:
+        handles += _draw_map(axes, post, post.grid, low, high)
+    frame = post.manifest.frames.odom if alone is not None else post.manifest.frames.map
+    frame = frame or ("odom" if alone is not None else "map")
+    canvas.dress(axes, f"x in {frame} [m]", f"y in {frame} [m]", size)
+    axes.set_aspect("equal")
+    axes.set_xlim(low[0], high[0])
+    axes.set_ylim(low[1], high[1])
+    handles += _draw_paths(axes, post, alone)
+    handles += _draw_parting(axes, post, size)
+    handles += _draw_stops(axes, post, size)
+    _draw_regions(axes, post, size)
+    canvas.legend(figure, handles, size, columns=2 if width_in < 5.0 else 4)
+    return figure
+
+
+def _path(post: Postmortem, name: str) -> se2.Array | None:
+    track = {
+        "belief": post.belief,
+        "hindsight": None if post.hindsight is None else post.hindsight.track,
+        "odometry": post.odometry,
+    }[name]
+    if track is None or not track.has_pose.any():
+        return None
+    return track.xyyaw
+
+
+def _window(post: Postmortem, paths: list[se2.Array]) -> tuple[se2.Array, se2.Array]:
+    """Lower left and upper right corner of what is worth showing, m: not narrower than 3:1."""
+    points = [p[:, :2] for p in paths]
+    points += [np.reshape(r.bbox_m, (2, 2)) for r in _regions(post)]
+    every = np.concatenate(points)
+    every = every[np.isfinite(every).all(axis=1)]
+    low, high = every.min(axis=0) - _MARGIN_M, every.max(axis=0) + _MARGIN_M
+    if post.grid is not None and len(walls := np.argwhere(post.grid.occupied)):
+        # A map not much larger than the paths is shown whole: its outer walls are landmarks.
+        xy = post.grid.centre_of(walls)
+        whole_low, whole_high = xy.min(axis=0) - 0.5, xy.max(axis=0) + 0.5
+        if (whole_high - whole_low <= 1.7 * (high - low)).all():
+            low, high = np.minimum(low, whole_low), np.maximum(high, whole_high)
+    lacks = np.max(high - low) / 3.0 - (high - low)
+    grow = np.maximum(lacks, 0.0) / 2.0
+    return low - grow, high + grow
+
+
+def _regions(post: Postmortem) -> list[ChangedRegion]:
+    changes = None if post.hindsight is None else post.hindsight.changes
+    return [] if changes is None else list(changes.regions)
+
+
+def _draw_map(
+    axes: Axes, post: Postmortem, grid: OccupancyGrid, low: se2.Array, high: se2.Array
+) -> list[object]:
+    corners = np.array([low, [low[0], high[1]], high, [high[0], low[1]]])
+    cells = grid.cell_of(corners)
+    shape = np.array(grid.cells.shape)
+    first = np.clip(cells.min(axis=0), 0, shape)
+    last = np.clip(cells.max(axis=0) + 1, 0, shape)
+    if (last <= first).any():
+        return []  # the paths lie beside the map altogether
+    part = (slice(first[0], last[0]), slice(first[1], last[1]))
+    block = max(1, int(np.ceil(np.max(last - first) / 900)))
+    image = np.ones((*_pooled(grid.occupied[part], block).shape, 3)) * to_rgb("#eceeea")
+    image[_pooled(grid.free[part], block)] = to_rgb("#ffffff")
+    image[_pooled(grid.occupied[part], block)] = to_rgb("#3b4146")
+    handles: list[object] = []
+    changes = None if post.hindsight is None else post.hindsight.changes
+    if changes is not None:
+        for mask, colour, label in (
+            (changes.removed, REMOVED, "mapped, but gone"),
+            (changes.appeared, APPEARED, "stands there, not mapped"),
+        ):
+            if mask[part].any():
+                image[_pooled(mask[part], block)] = to_rgb(colour)
+                handles.append(Patch(facecolor=colour, edgecolor=FAINT, lw=0.6, label=label))
+    step = grid.resolution_m * block
+    x0, y0 = first[1] * grid.resolution_m, first[0] * grid.resolution_m
+    extent = (x0, x0 + image.shape[1] * step, y0, y0 + image.shape[0] * step)
+    place = Affine2D().rotate(grid.origin_xyyaw[2]).translate(*grid.origin_xyyaw[:2])
+    shown = axes.imshow(image, extent=extent, origin="lower", interpolation="nearest", zorder=1)
+    shown.set_transform(place + axes.transData)
+    return handles
+
+
+def _pooled(mask: NDArray[np.bool_], block: int) -> NDArray[np.bool_]:
+    """Blocks of cells in which any is true: a thin wall survives a coarse picture."""
+    if block == 1:
+        return mask
+    height, width = (-(-n // block) * block for n in mask.shape)
+    whole = np.zeros((height, width), dtype=bool)
+    whole[: mask.shape[0], : mask.shape[1]] = mask
+    blocks = whole.reshape(height // block, block, width // block, block)
+    return np.asarray(blocks.any(axis=(1, 3)))
+
+
+def _draw_paths(axes: Axes, post: Postmortem, alone: se2.Array | None) -> list[object]:
+    if alone is not None:
+        xy = canvas.strided(alone)
+        axes.plot(xy[:, 0], xy[:, 1], color=FAINT, linewidth=1.8)
+        return [Line2D([], [], color=FAINT, linewidth=1.8, label="odometry alone")]
+    handles: list[object] = []
+    styles: tuple[tuple[str, str, Literal["-", "--"], float, str], ...] = (
+        ("hindsight", BLUE, "-", 2.4, "where it really was"),
+        ("belief", VERMILLION, "--", 1.8, "where it believed to be"),
+    )
+    for name, colour, style, width, label in styles:
+        path = _path(post, name)
+        if path is None:
+            continue
+        xy = canvas.strided(path)
+        axes.plot(xy[:, 0], xy[:, 1], color=colour, linewidth=width, linestyle=style, zorder=4)
+        handles.append(Line2D([], [], color=colour, linewidth=width, linestyle=style, label=label))
+        known = xy[np.isfinite(xy).all(axis=1)]
+        axes.plot(*known[0, :2], "o", color="white", markeredgecolor=colour, ms=6, zorder=6)
+        axes.plot(*known[-1, :2], "s", color=colour, ms=5, zorder=6)
+    handles.append(Line2D([], [], color=FAINT, marker="o", mfc="white", ls="", label="start"))
+    handles.append(Line2D([], [], color=FAINT, marker="s", ls="", label="end"))
+    return handles
+
+
+def _draw_parting(axes: Axes, post: Postmortem, size: float) -> list[object]:
+    """Links from belief to hindsight where they are too far apart, and the widest one named."""
+    error = post.error
+    if error is None or post.belief is None or not np.isfinite(error.distance_m).any():
+        return []
+    distance = np.where(np.isfinite(error.distance_m), error.distance_m, 0.0)
+    apart = np.flatnonzero(distance > post.limits.position_m)
+    if not len(apart):
+        return []
+    for row in canvas.strided(apart, most=40):
+        ends = np.array([post.belief.xyyaw[row, :2], error.where.xyyaw[row, :2]])
+        axes.plot(ends[:, 0], ends[:, 1], color=INK, linewidth=0.7, alpha=0.55, zorder=3)
+    worst = int(np.argmax(distance))
+    ends = np.array([post.belief.xyyaw[worst, :2], error.where.xyyaw[worst, :2]])
+    axes.plot(ends[:, 0], ends[:, 1], color=INK, linewidth=1.6, zorder=5)
+    at_s = post.seconds(error.t_ns[worst])
+    axes.annotate(
+        f"{distance[worst]:.1f} m apart\nat {at_s:.0f} s",
+        tuple(ends.mean(axis=0)),
+        xytext=(8, 8),
+        textcoords="offset points",
+        fontsize=size,
+        fontweight="bold",
+        color=INK,
+        zorder=8,
+        bbox={"boxstyle": "round,pad=0.25", "fc": "white", "ec": INK, "lw": 0.6, "alpha": 0.92},
+    )
+    return [Line2D([], [], color=INK, linewidth=1.0, label="same moment, apart")]
+
+
+def _draw_stops(axes: Axes, post: Postmortem, size: float) -> list[object]:
+    drawn = False
+    for number, stop in enumerate(post.judgement.stops, start=1):
+        if stop.x_m is None or stop.y_m is None or number > 30:
+            continue
+        axes.plot(stop.x_m, stop.y_m, "o", ms=size + 3, color=INK, mec="white", zorder=7)
+        axes.annotate(
+            str(number),
+            (stop.x_m, stop.y_m),
+            ha="center",
+            va="center_baseline",
+            color="white",
+            fontsize=size - 2,
+            zorder=8,
+        )
+        drawn = True
+    return [Line2D([], [], color=INK, marker="o", ls="", label="unplanned stop")] if drawn else []
+
+
+def _draw_regions(axes: Axes, post: Postmortem, size: float) -> None:
+    for number, region in enumerate(_regions(post), start=1):
+        x0, y0, x1, y1 = region.bbox_m
+        box = Rectangle(
+            (x0 - 0.1, y0 - 0.1),
+            x1 - x0 + 0.2,
+            y1 - y0 + 0.2,
+            fill=False,
+            edgecolor=INK,
+            linewidth=1.0,
+            linestyle=(0, (1, 1.5)),
+            zorder=5,
+        )
+        axes.add_patch(box)
+        if region.from_bbox_m is not None:
+            old = np.reshape(region.from_bbox_m, (2, 2)).mean(axis=0)
+            new = np.array([x0 + x1, y0 + y1]) / 2.0
+            axes.annotate(
+                "",
+                (new[0], new[1]),
+                (old[0], old[1]),
+                arrowprops={"arrowstyle": "->", "color": INK, "linewidth": 1.0},
+                zorder=5,
+            )
+        if number <= 12:
+            axes.annotate(
+                f"R{number}",
+                (x1 + 0.1, y1 + 0.1),
+                fontsize=size - 1,
+                fontweight="bold",
+                color=INK,
+                zorder=8,
+                bbox={"boxstyle": "round,pad=0.15", "fc": "white", "ec": INK, "lw": 0.6},
+            )

@@ -1,0 +1,68 @@
+"""report.html: one file, no network, nothing in it that runs."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib.resources import files
+
+from jinja2 import Environment, StrictUndefined
+from matplotlib.figure import Figure
+
+from slamreplay.report.evidence import Postmortem
+from slamreplay.report.figures import canvas
+from slamreplay.report.figures.course import course_figure
+from slamreplay.report.figures.covariance import covariance_figure
+from slamreplay.report.figures.map import map_figure
+from slamreplay.report.page import Page, page
+
+
+@dataclass(frozen=True)
+class Picture:
+    """One figure in two widths, as data URIs, and what it shows in words."""
+
+    wide: str
+    narrow: str
+    alt: str
+
+
+def html(post: Postmortem) -> str:
+    """The whole page. Whatever came from the log is escaped by the template engine."""
+    style = files("slamreplay.report").joinpath("templates/report.css").read_text("utf-8")
+    source = files("slamreplay.report").joinpath("templates/report.html.j2").read_text("utf-8")
+    view = page(post)
+    # A hash, not 'unsafe-inline': the page's own style is the only one a browser applies.
+    digest = base64.b64encode(hashlib.sha256(style.encode()).digest()).decode()
+    policy = (
+        f"default-src 'none'; img-src data:; style-src 'sha256-{digest}'; "
+        "base-uri 'none'; form-action 'none'"
+    )
+    environment = Environment(
+        autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+    )
+    return environment.from_string(source).render(
+        page=view, policy=policy, style=style, **_pictures(post, view)
+    )
+
+
+def _pictures(post: Postmortem, view: Page) -> dict[str, Picture | None]:
+    return {
+        "map": _picture(post, map_figure, canvas.BESIDE, view.map_alt),
+        "course": _picture(post, course_figure, canvas.WIDE, view.course_alt),
+        "covariance": _picture(post, covariance_figure, canvas.WIDE, view.covariance_alt),
+    }
+
+
+def _picture(
+    post: Postmortem, draw: Callable[[Postmortem, float], Figure | None], width_in: float, alt: str
+) -> Picture | None:
+    with canvas.plain_style():
+        wide, narrow = draw(post, width_in), draw(post, canvas.NARROW)
+        return None if wide is None or narrow is None else Picture(_uri(wide), _uri(narrow), alt)
+
+
+def _uri(figure: Figure) -> str:
+    svg = base64.b64encode(canvas.svg_bytes(figure)).decode()
+    return f"data:image/svg+xml;base64,{svg}"

@@ -1,0 +1,199 @@
+"""report.json as types: strict, every key always there, null for what is not known.
+
+`report.schema.json` beside this module is printed from these classes (`python -m
+slamreplay.report.model` rewrites it; a test keeps the two in step).
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
+
+from slamreplay.bundle.findings import Severity
+from slamreplay.bundle.schema import PARTS
+from slamreplay.verdict.judgement import FailureKind, State
+
+SCHEMA_VERSION: Literal[1] = 1
+SCHEMA_FILE = Path(__file__).with_name("report.schema.json")
+
+
+def _finite(value: Any) -> float | None:
+    """JSON has no NaN and no infinity: what is not a finite number is not known."""
+    if value is None or not math.isfinite(value):
+        return None
+    return float(value)
+
+
+def _whole(value: Any) -> int | None:
+    return None if value is None else int(value)
+
+
+Number = Annotated[float | None, BeforeValidator(_finite)]
+Count = Annotated[int | None, BeforeValidator(_whole)]
+Ns = Annotated[int, BeforeValidator(_whole)]
+Share = Annotated[float | None, BeforeValidator(_finite), Field(ge=0.0, le=1.0)]
+Bbox = tuple[float, float, float, float]
+
+
+class _Strict(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+
+
+class BundlePart(_Strict):
+    """The evidence: where it came from, its time range in ns on `clock`, what it lacks."""
+
+    id: str
+    sources: list[str]
+    start_ns: Ns
+    end_ns: Ns
+    clock: str
+    map_version: str | None
+    missing: list[str] = Field(json_schema_extra={"items": {"enum": list(PARTS)}})
+
+
+class VerdictPart(_Strict):
+    """The answer, and one sentence a shift lead understands."""
+
+    state: State
+    confidence: Share
+    summary: str
+
+
+class IntervalPart(_Strict):
+    """A stretch of one state; the intervals tile the log."""
+
+    state: State
+    start_ns: Ns
+    end_ns: Ns
+    confidence: Share
+    max_error_m: Number
+    max_error_rad: Number
+    findings: list[str]
+
+
+class RegionPart(_Strict):
+    """A patch of the map that is not true; boxes are x_min, y_min, x_max, y_max in the map frame.
+
+    `from_bbox_m` is the old place of a moved region, null otherwise.
+    """
+
+    kind: Literal["appeared", "removed", "moved"]
+    bbox_m: Bbox
+    from_bbox_m: Bbox | None
+    area_m2: Number
+    first_seen_ns: Ns
+    last_seen_ns: Ns
+    views: Ns
+    confidence: Share
+
+
+class ReferencePart(_Strict):
+    """What the belief was judged against; `trajectory` is the file's name beside report.json."""
+
+    kind: str | None
+    trajectory: str | None
+    sigma_m: Number
+    coverage: Share
+
+
+class FailureModePart(_Strict):
+    """How it failed, and what says so."""
+
+    kind: FailureKind
+    confidence: Share
+    evidence: list[str]
+
+
+class StopPart(_Strict):
+    """An unplanned stop: when, where the robot really was (null: not known), state, first cause."""
+
+    t_ns: Ns
+    x_m: Number
+    y_m: Number
+    state: State
+    cause: str
+
+
+class ActionPart(_Strict):
+    """A recovery or motion, and whether the uncertainty of that moment allowed it.
+
+    `sigma_m` is towards the nearest obstacle, `clearance_m` from the footprint's edge, `ratio` is
+    3 sigma over clearance; `allowed` is null where these are not known.
+    """
+
+    t_ns: Ns
+    kind: Literal["recovery", "motion"]
+    name: str
+    sigma_m: Number
+    clearance_m: Number
+    ratio: Number
+    allowed: bool | None
+
+
+class FindingPart(_Strict):
+    """A check's answer with its numbers; `slamreplay explain ID` says what it means."""
+
+    id: str
+    severity: Severity
+    title: str
+    message: str
+    start_ns: Count
+    end_ns: Count
+    value: Number
+    low: Number
+    high: Number
+    unit: str
+    n: Count
+    n_eff: Number
+
+
+class TrialPart(_Strict):
+    """One estimator run; perturbation and level are null for the baseline.
+
+    A trial the estimator could not honour has the one metric `not_applicable`, true.
+    """
+
+    estimator: str
+    perturbation: str | None
+    level: Number
+    unit: str
+    metrics: dict[str, bool | Number]
+
+
+class Report(_Strict):
+    """report.json."""
+
+    schema_version: Literal[1]
+    slamreplay: str
+    bundle: BundlePart
+    verdict: VerdictPart
+    intervals: list[IntervalPart]
+    changed_regions: list[RegionPart]
+    reference: ReferencePart
+    failure_mode: FailureModePart
+    stops: list[StopPart]
+    actions: list[ActionPart]
+    findings: list[FindingPart]
+    trials: list[TrialPart]
+
+    def json_text(self) -> str:
+        """The file's text; NaN cannot occur in it."""
+        return json.dumps(self.model_dump(mode="json"), indent=1, allow_nan=False) + "\n"
+
+
+def schema_text() -> str:
+    """The JSON Schema of report.json."""
+    schema = {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": f"slamreplay report, schema version {SCHEMA_VERSION}",
+        **{k: v for k, v in Report.model_json_schema().items() if k != "title"},
+    }
+    return json.dumps(schema, indent=1, sort_keys=False) + "\n"
+
+
+if __name__ == "__main__":
+    SCHEMA_FILE.write_text(schema_text(), encoding="utf-8")

@@ -1,0 +1,243 @@
+"""What the page says, as plain text and numbers; how it looks is the template's business."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from datetime import UTC, datetime
+
+from slamreplay import __version__
+from slamreplay.bundle.findings import FINDINGS, SEVERITIES, Explanation
+from slamreplay.bundle.manifest import Manifest
+from slamreplay.geometry.times import NS_PER_S
+from slamreplay.report import phrases, tables
+from slamreplay.report.assess import not_assessable, title_of
+from slamreplay.report.evidence import Postmortem
+from slamreplay.report.facts import Fact, deciding_facts
+from slamreplay.report.phrases import number, percent, seconds, span
+from slamreplay.report.tables import Table, table
+from slamreplay.report.words import FAILURE_MODES, STATES, StateWords
+
+
+@dataclass(frozen=True)
+class Band:
+    """A stretch of the timeline: its place in thousandths of the log."""
+
+    state: str
+    x: float
+    width: float
+    title: str
+
+
+@dataclass(frozen=True)
+class FindingRow:
+    """A finding with its explanation."""
+
+    id: str
+    severity: str
+    title: str
+    message: str
+    when: str
+    numbers: str
+    explanation: Explanation | None
+
+
+@dataclass(frozen=True)
+class Page:
+    """Everything the template prints."""
+
+    version: str
+    title: str
+    bundle_id: str
+    when: str
+    state: str
+    words: StateWords
+    confidence: str
+    summary: str
+    facts: tuple[Fact, ...]
+    failure_mode: str
+    evidence: tuple[str, ...]
+    bands: tuple[Band, ...]
+    marks: tuple[Band, ...]
+    end: str
+    legend: tuple[tuple[str, str], ...]
+    intervals: Table
+    stops: Table
+    actions: Table
+    regions: Table
+    trials: Table
+    findings: tuple[FindingRow, ...]
+    unasked: tuple[tuple[str, str, str], ...]
+    missing: tuple[tuple[str, str, str], ...]
+    audit: tuple[tuple[str, str], ...]
+    roles: Table
+    frames: Table
+    losses: Table
+    sources: Table
+    map_files: str
+    map_alt: str
+    course_alt: str
+    covariance_alt: str
+    reference_note: str
+
+
+def page(post: Postmortem) -> Page:
+    """The page of a post-mortem."""
+    judgement, manifest = post.judgement, post.manifest
+    seen = dict.fromkeys(i.state for i in judgement.intervals)
+    return Page(
+        version=__version__,
+        title=_title(manifest),
+        bundle_id=manifest.bundle_id,
+        when=_when(manifest),
+        state=judgement.state,
+        words=STATES[judgement.state],
+        confidence=percent(judgement.confidence),
+        summary=judgement.summary,
+        facts=deciding_facts(post),
+        failure_mode=_failure_mode(post),
+        evidence=judgement.failure_mode.evidence,
+        bands=_bands(post),
+        marks=_marks(post),
+        end=seconds(manifest.end_ns - manifest.start_ns),
+        legend=tuple((state, STATES[state].name) for state in seen),
+        intervals=tables.intervals(post),
+        stops=tables.stops(post),
+        actions=tables.actions(post),
+        regions=tables.regions(post),
+        trials=tables.trials(post),
+        findings=_findings(post),
+        unasked=tuple((i, title_of(i), why) for i, why in not_assessable(post).items()),
+        missing=tuple((m.part, m.reason, m.consequence) for m in manifest.missing),
+        audit=_audit(manifest),
+        roles=table(
+            ("role", "topic", "type", "messages", "why this one"),
+            [(r.role, r.topic, r.type, f"{r.messages}", r.reason) for r in manifest.roles],
+        ),
+        frames=table(
+            ("parent", "child", "kind", "samples"),
+            [
+                (e.parent, e.child, "static" if e.is_static else "moving", f"{e.samples}")
+                for e in manifest.frames.tree
+            ],
+        ),
+        losses=table(
+            ("kind", "what", "count", "why"),
+            [(x.kind, x.what, f"{x.count}", x.reason) for x in manifest.losses],
+        ),
+        sources=table(
+            ("file", "format", "bytes", "sha256"),
+            [(s.name, s.format, f"{s.bytes:,}", s.sha256) for s in manifest.sources],
+        ),
+        map_files=_map_files(post),
+        map_alt=phrases.map_alt(post),
+        course_alt=phrases.course_alt(post),
+        covariance_alt=phrases.covariance_alt(post),
+        reference_note=phrases.reference_note(post),
+    )
+
+
+def _title(manifest: Manifest) -> str:
+    names = [source.name for source in manifest.sources]
+    shown = " + ".join(names[:3]) or manifest.bundle_id
+    return shown if len(names) <= 3 else f"{shown} + {len(names) - 3} more"
+
+
+def _when(manifest: Manifest) -> str:
+    length = f"{(manifest.end_ns - manifest.start_ns) / NS_PER_S:.1f} s"
+    start_s = manifest.start_ns // NS_PER_S
+    if not 1e9 < start_s < 4e9:  # simulated time, or a clock that was never set
+        return f"{length} from t = {start_s} s on the {manifest.clock.name} clock"
+    start = datetime.fromtimestamp(start_s, tz=UTC)
+    return f"{length} from {start:%Y-%m-%d %H:%M:%S} UTC on the {manifest.clock.name} clock"
+
+
+def _failure_mode(post: Postmortem) -> str:
+    mode = post.judgement.failure_mode
+    if mode.kind == "none":
+        return ""
+    sure = "" if mode.confidence is None else f" ({percent(mode.confidence)})"
+    return f"{FAILURE_MODES[mode.kind]}{sure}"
+
+
+def _bands(post: Postmortem) -> tuple[Band, ...]:
+    start, whole = post.manifest.start_ns, max(post.manifest.end_ns - post.manifest.start_ns, 1)
+    return tuple(
+        Band(
+            i.state,
+            round(1000.0 * (i.start_ns - start) / whole, 3),
+            round(1000.0 * (i.end_ns - i.start_ns) / whole, 3),
+            f"{STATES[i.state].name}: {span(post, i.start_ns, i.end_ns)}",
+        )
+        for i in post.judgement.intervals
+    )
+
+
+def _marks(post: Postmortem) -> tuple[Band, ...]:
+    start, whole = post.manifest.start_ns, max(post.manifest.end_ns - post.manifest.start_ns, 1)
+    return tuple(
+        Band(
+            s.state,
+            round(1000.0 * (s.t_ns - start) / whole, 3),
+            0.0,
+            f"Stop {k} at {seconds(s.t_ns - start)}",
+        )
+        for k, s in enumerate(post.judgement.stops, start=1)
+    )
+
+
+def _findings(post: Postmortem) -> tuple[FindingRow, ...]:
+    return tuple(
+        FindingRow(
+            f.id,
+            f.severity,
+            title_of(f.id),
+            f.message,
+            span(post, f.start_ns, f.end_ns),
+            _judged(f.value, f.low, f.high, f.unit, f.n, f.n_eff),
+            FINDINGS.get(f.id),
+        )
+        for f in sorted(post.findings, key=lambda f: -SEVERITIES.index(f.severity))
+    )
+
+
+def _judged(
+    value: float | None,
+    low: float | None,
+    high: float | None,
+    unit: str,
+    n: int | None,
+    n_eff: float | None,
+) -> str:
+    parts = []
+    if value is not None:
+        parts.append(f"value {value:.3g} {unit}".strip())
+    if low is not None or high is not None:
+        parts.append(f"expected {number(low, '.3g')} to {number(high, '.3g')}")
+    if n is not None:
+        effective = "" if n_eff is None else f", worth {n_eff:.0f} independent ones"
+        parts.append(f"{n} samples{effective}")
+    return "; ".join(parts)
+
+
+def _audit(manifest: Manifest) -> tuple[tuple[str, str], ...]:
+    frames = manifest.frames
+    contract = (("map", frames.map), ("odom", frames.odom), ("base", frames.base))
+    return (
+        ("clock", f"{manifest.clock.name}: {manifest.clock.reason}"),
+        ("frames", ", ".join(f"{name}: {frame or 'none'}" for name, frame in contract)),
+        (
+            "map",
+            "; ".join(
+                f"{m.source}: {m.width} x {m.height} cells of {m.resolution_m:g} m, {m.version}"
+                for m in manifest.maps
+            )
+            or "none",
+        ),
+        ("options", ", ".join(f"{k} = {v}" for k, v in manifest.options.items()) or "defaults"),
+    )
+
+
+def _map_files(post: Postmortem) -> str:
+    names = [] if post.hindsight is None else ["hindsight.tum"]
+    names += [] if post.grid is None else ["changed.pgm", "changed.yaml"]
+    return ", ".join(names)

@@ -1,0 +1,85 @@
+"""Numbers and times as people read them, and the figures in words."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from slamreplay.geometry.times import NS_PER_S
+from slamreplay.report.evidence import Postmortem
+from slamreplay.report.words import STATES
+
+#: What stands in a cell for a number that is not known.
+NOT_KNOWN = "-"
+
+
+def percent(share: float | None) -> str:
+    """A share from 0 to 1."""
+    # 100 % would claim more than any evidence gives.
+    return "not known" if share is None else f"{min(100.0 * share, 99.0):.0f} %"
+
+
+def seconds(t_ns: float) -> str:
+    """A duration in ns."""
+    return f"{t_ns / NS_PER_S:.1f} s"
+
+
+def number(value: float | None, form: str = ".2f", unit: str = "") -> str:
+    """A number, or a dash where it is not known."""
+    if value is None or not np.isfinite(value):
+        return NOT_KNOWN
+    return f"{value:{form}}{' ' if unit else ''}{unit}"
+
+
+def span(post: Postmortem, start_ns: int | None, end_ns: int | None) -> str:
+    """From when to when, in s since the log's start."""
+    origin = post.manifest.start_ns
+    if start_ns is None:
+        return ""
+    if end_ns is None or end_ns == start_ns:
+        return seconds(start_ns - origin)
+    return f"{(start_ns - origin) / NS_PER_S:.1f} to {seconds(end_ns - origin)}"
+
+
+def map_alt(post: Postmortem) -> str:
+    """The map figure in words."""
+    error = post.error
+    if error is None or not np.isfinite(error.distance_m).any():
+        return "Map with the path of the robot, as far as it is known."
+    worst = int(np.nanargmax(error.distance_m))
+    return (
+        "Map with the believed path and the path rebuilt in hindsight; they are "
+        f"{error.distance_m[worst]:.2f} m apart at worst, at "
+        f"{float(post.seconds(error.t_ns[worst])):.1f} s."
+    )
+
+
+def course_alt(post: Postmortem) -> str:
+    """The figure of the log's course in words."""
+    states = "; ".join(
+        f"{STATES[i.state].name} {span(post, i.start_ns, i.end_ns)}"
+        for i in post.judgement.intervals[:8]
+    )
+    return f"Error of the belief and share of changed beams over time. {states}."
+
+
+def covariance_alt(post: Postmortem) -> str:
+    """The covariance figure in words."""
+    mean = None if post.nees is None else post.nees.summary("joint").mean
+    if mean is None:
+        return "Covariance ellipses along the believed path."
+    return (
+        "Covariance ellipses along the believed path, claimed against real error, and NEES over "
+        f"time with a mean of {mean:.3g} where 3 is expected."
+    )
+
+
+def reference_note(post: Postmortem) -> str:
+    """What the covariance was measured against."""
+    if post.reference_kind is None:
+        return "There is no reference to measure the belief's errors against."
+    if post.reference_kind == "hindsight":
+        return (
+            "Measured against hindsight, which shares its scans with the belief: it can show "
+            "over-confidence and never proves consistency."
+        )
+    return f"Measured against the log's own reference ({post.reference_kind.replace('_', ' ')})."

@@ -1,0 +1,171 @@
+"""The page's tables: plain cells from a post-mortem."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from slamreplay.report.evidence import Postmortem
+from slamreplay.report.phrases import NOT_KNOWN, number, percent, seconds, span
+from slamreplay.report.words import STATES
+
+#: Rows of one table on the page; report.json has them all.
+MOST_ROWS = 40
+
+
+#: The metrics that have a column on the page, as it calls them; report.json has them all.
+_COLUMNS = {
+    "reference_rmse_m": "off the reference, rms [m]",
+    "reference_max_m": "at most [m]",
+    "hindsight_rmse_m": "off hindsight, rms [m]",
+    "hindsight_max_m": "at most [m]",
+    "lost_share": "share lost [1]",
+    "baseline_max_m": "off its baseline, at most [m]",
+    "nees_mean": "mean NEES [1]",
+}
+
+
+@dataclass(frozen=True)
+class Cell:
+    """A cell's text, and a smaller line under it."""
+
+    text: str
+    aside: str = ""
+
+    @property
+    def width(self) -> str:
+        """How the cell wraps: short texts stay on one line, long ones get room."""
+        return "long" if len(self.text) > 28 else "short"
+
+
+@dataclass(frozen=True)
+class Table:
+    """Cells under a head, and how many rows were left out."""
+
+    head: tuple[str, ...]
+    rows: tuple[tuple[Cell, ...], ...]
+    more: int = 0
+
+
+def table(head: tuple[str, ...], rows: Sequence[Sequence[str | Cell]]) -> Table:
+    """A table of the first rows; the rest is counted."""
+    shown = tuple(
+        tuple(cell if isinstance(cell, Cell) else Cell(cell) for cell in row)
+        for row in rows[:MOST_ROWS]
+    )
+    return Table(head, shown, max(0, len(rows) - MOST_ROWS))
+
+
+def intervals(post: Postmortem) -> Table:
+    """What held when."""
+    rows = [
+        (
+            STATES[i.state].name,
+            span(post, i.start_ns, i.end_ns),
+            seconds(i.duration_ns),
+            percent(i.confidence),
+            number(i.max_error_m, ".2f", "m"),
+            number(None if i.max_error_rad is None else np.degrees(i.max_error_rad), ".0f", "deg"),
+            ", ".join(i.findings) or NOT_KNOWN,
+        )
+        for i in post.judgement.intervals
+    ]
+    head = ("state", "when", "length", "confidence", "off by up to", "heading", "findings")
+    return table(head, rows)
+
+
+def stops(post: Postmortem) -> Table:
+    """Unplanned stops."""
+    origin = post.manifest.start_ns
+    rows = [
+        (
+            f"{k}",
+            seconds(s.t_ns - origin),
+            NOT_KNOWN if s.x_m is None or s.y_m is None else f"{s.x_m:.2f}, {s.y_m:.2f} m",
+            STATES[s.state].name,
+            s.cause,
+        )
+        for k, s in enumerate(post.judgement.stops, start=1)
+    ]
+    return table(("stop", "when", "where (x, y in map)", "state then", "first cause"), rows)
+
+
+def actions(post: Postmortem) -> Table:
+    """Blocked ones first, then those nobody can tell: an allowed motion is no news."""
+    order = {False: 0, None: 1, True: 2}
+    actions = sorted(post.judgement.actions, key=lambda a: (order[a.allowed], a.t_ns))
+    words = {False: "no", None: "unknown", True: "yes"}
+    rows = [
+        (
+            seconds(a.t_ns - post.manifest.start_ns),
+            a.kind,
+            a.name,
+            number(a.sigma_m, ".3f", "m"),
+            number(a.clearance_m, ".2f", "m"),
+            number(a.ratio),
+            words[a.allowed],
+        )
+        for a in actions
+    ]
+    return table(
+        ("when", "kind", "name", "sigma", "clearance", "3 sigma / clearance", "allowed"), rows
+    )
+
+
+def regions(post: Postmortem) -> Table:
+    """Changed regions."""
+    changes = None if post.hindsight is None else post.hindsight.changes
+    regions = () if changes is None else changes.regions
+    rows = [
+        (
+            f"R{k}",
+            r.kind,
+            "{:.1f}, {:.1f} to {:.1f}, {:.1f} m".format(*r.bbox_m)
+            + (
+                ""
+                if r.from_bbox_m is None
+                else " (was at {:.1f}, {:.1f} to {:.1f}, {:.1f} m)".format(*r.from_bbox_m)
+            ),
+            number(r.area_m2, ".2f", "m²"),
+            span(post, r.first_seen_ns, r.last_seen_ns),
+            f"{r.views}",
+            percent(r.confidence),
+        )
+        for k, r in enumerate(regions, start=1)
+    ]
+    return table(
+        ("region", "what", "where (x, y in map)", "area", "seen", "views", "confidence"), rows
+    )
+
+
+def trials(post: Postmortem) -> Table:
+    """A row per trial, a column per metric; each perturbed number stands beside its baseline."""
+    names = [name for name in _COLUMNS if any(t.metrics.get(name) is not None for t in post.trials)]
+    baselines = {
+        t.run.trial.estimator: t.metrics for t in post.trials if t.run.trial.perturbation is None
+    }
+    rows: list[list[str | Cell]] = []
+    for result in post.trials:
+        trial = result.run.trial
+        base = {} if trial.perturbation is None else baselines.get(trial.estimator, {})
+        cells: list[str | Cell] = [
+            trial.estimator,
+            trial.perturbation or "baseline",
+            NOT_KNOWN if trial.level is None else f"{trial.level:g} {trial.unit}".strip(),
+        ]
+        for name in names:
+            beside = base.get(name) if name != "baseline_max_m" else None
+            aside = "" if beside is None else f"baseline {_short(beside)}"
+            cells.append(Cell(_short(result.metrics.get(name)), aside))
+        if result.run.estimate is None:
+            cells[3:] = [Cell("not applicable", result.run.not_applicable or "")]
+            cells += [""] * (len(names) - 1)
+        rows.append(cells)
+    head = ("estimator", "perturbation", "level", *(_COLUMNS[n] for n in names))
+    return table(head, rows)
+
+
+def _short(value: float | None) -> str:
+    return number(value, ".0f" if value is not None and abs(value) >= 1000.0 else ".3g")

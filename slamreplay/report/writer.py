@@ -1,0 +1,44 @@
+"""A report on disk: a folder that is whole or absent."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from slamreplay.bundle.atomic import atomic_folder
+from slamreplay.report.build import TRAJECTORY_FILE, build
+from slamreplay.report.changed_map import changed_files
+from slamreplay.report.evidence import Postmortem
+from slamreplay.report.html import html
+from slamreplay.report.junit import junit_xml
+from slamreplay.report.trajectory import tum
+
+MARKER = "report.json"
+
+
+def write_report(post: Postmortem, target: Path) -> Path:
+    """Write report.html, report.json, junit.xml and, with a map, the trajectory and changed cells.
+
+    Args:
+        post: the post-mortem; the same one gives the same bytes.
+        target: folder; a report that is there already is replaced in one step.
+
+    Returns:
+        The path of report.html.
+
+    Raises:
+        OutputError: the folder is somebody else's or cannot be written.
+    """
+    content = {
+        MARKER: build(post).json_text().encode(),
+        "report.html": html(post).encode(),
+        "junit.xml": junit_xml(post).encode(),
+    }
+    if post.hindsight is not None:
+        content[TRAJECTORY_FILE] = tum(post.hindsight.track).encode()
+    if post.grid is not None:
+        changes = None if post.hindsight is None else post.hindsight.changes
+        content |= changed_files(post.grid, changes)
+    with atomic_folder(target, marker=MARKER) as work:
+        for name, data in content.items():
+            (work / name).write_bytes(data)
+    return target / "report.html"
