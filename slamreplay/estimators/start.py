@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from slamreplay.bundle.belief import arrival_ns, recorded_belief
 from slamreplay.bundle.track import PoseTrack
 from slamreplay.bundle.view import BundleView
+from slamreplay.errors import NotApplicableError
 from slamreplay.geometry import se2, se3
 from slamreplay.geometry.covariance import planar_from_ros
 
@@ -47,6 +48,9 @@ def starts(view: BundleView, t_ns: NDArray[np.int64], T_odom_base: se2.Array) ->
         view: the log, and the settings that perturb its first start.
         t_ns: (N,) times of the estimator's rows, sorted.
         T_odom_base: (N, 3) odometry at these times, NaN where unknown: there nothing starts.
+
+    Raises:
+        NotApplicableError: the first start is to be moved, and there is none.
     """
     rows = np.flatnonzero(np.isfinite(T_odom_base).all(axis=1))
     found = _given(view, t_ns, T_odom_base, rows)
@@ -59,6 +63,8 @@ def starts(view: BundleView, t_ns: NDArray[np.int64], T_odom_base: se2.Array) ->
         found[0] = _perturbed(found[0], view)
     elif view.settings.get(GLOBAL) and len(rows):
         found = [Start(int(rows[0]), None, DEFAULT_COV)]
+    elif OFFSET in view.settings or ROTATE in view.settings:
+        raise NotApplicableError("the log has no start that could be moved")
     return found
 
 

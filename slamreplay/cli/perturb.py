@@ -1,0 +1,136 @@
+"""`slamreplay perturb`: run estimators again, undisturbed and with one thing changed at a time."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from slamreplay.cli import options
+
+if TYPE_CHECKING:
+    from slamreplay.replay.metrics import Metrics
+
+Estimators = Annotated[
+    list[str] | None,
+    typer.Option("--estimator", "-e", metavar="NAME", help="Estimator; several by repeating it."),
+]
+Perturbations = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--perturbation",
+        "-p",
+        metavar="NAME[.VARIANT]=LEVEL",
+        help="One change, e.g. tf_delay=0.2; several by repeating it, each run by itself.",
+    ),
+]
+Output = Annotated[Path, typer.Option("-o", "--output", metavar="RUNS", help="Folder to write.")]
+
+_COLUMNS = (
+    ("median [m]", "baseline_median_m"),
+    ("max [m]", "baseline_max_m"),
+    ("end [m]", "baseline_final_m"),
+    ("max [rad]", "baseline_max_rad"),
+    ("rmse to ref. [m]", "reference_rmse_m"),
+)
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command."""
+    app.command("perturb")(perturb)
+
+
+def perturb(
+    logs: options.Logs,
+    output: Output,
+    perturbations: Perturbations = None,
+    estimators: Estimators = None,
+    seed: options.Seed = 0,
+    map_yaml: options.MapYaml = None,
+    topics: options.Topics = None,
+    robot: options.Robot = None,
+    reference: options.Reference = None,
+    start_s: options.Start = None,
+    end_s: options.End = None,
+    as_json: options.Json = False,
+) -> None:
+    """Run estimators on a log: each by itself, then with one perturbation at a time.
+
+    The table shows how far each run is from the undisturbed run of the same estimator.
+    """
+    from slamreplay.bundle.atomic import refuse_foreign
+    from slamreplay.cli.main import cache_folder
+    from slamreplay.cli.progress import progress_bar
+    from slamreplay.estimators import ESTIMATORS
+    from slamreplay.replay.design import design, parse_perturbation
+    from slamreplay.replay.folder import RUNS, write_runs
+    from slamreplay.replay.metrics import trial_metrics
+    from slamreplay.replay.runner import replay
+
+    refuse_foreign(output, RUNS)
+    for text in perturbations or ():  # before minutes are spent on reading the log
+        parse_perturbation(text)
+    for name in estimators or ():
+        ESTIMATORS.load(name)
+    how = options.ingest_options(
+        map_yaml=map_yaml,
+        topics=topics,
+        robot=robot,
+        reference=reference,
+        start_s=start_s,
+        end_s=end_s,
+    )
+    with options.evidence(logs, how) as bundle:
+        trials = design(bundle, estimators or list(ESTIMATORS), perturbations or (), seed)
+        with progress_bar("replaying") as progress:
+            runs = replay(bundle, trials, progress=progress, cache=cache_folder() / "runs")
+        is_raw = bundle.path is None or bundle.path.resolve() != logs[0].resolve()
+        write_runs(output, bundle, runs, keep_bundle=is_raw)
+        rows: list[dict[str, Any]] = [
+            {
+                "estimator": run.trial.estimator,
+                "perturbation": run.trial.perturbation,
+                "level": run.trial.level,
+                "unit": run.trial.unit,
+                "not_applicable": run.not_applicable,
+                "metrics": trial_metrics(run, runs, bundle),
+            }
+            for run in runs
+        ]
+    if as_json:
+        import json
+
+        typer.echo(json.dumps({"runs": str(output), "trials": rows}, indent=1, allow_nan=False))
+        return
+    typer.echo(_text(rows))
+    typer.echo(f"runs written to {output}", err=True)
+
+
+def _text(rows: list[dict[str, Any]]) -> str:
+    """The trials as a table: every estimator's baseline, and below it what changes from it."""
+    order = list(dict.fromkeys(str(row["estimator"]) for row in rows))
+    lines = [["estimator", "perturbation", "level", *(title for title, _ in _COLUMNS)]]
+    for row in sorted(rows, key=lambda row: order.index(str(row["estimator"]))):
+        level = "" if row["level"] is None else f"{row['level']:g} {row['unit']}"
+        line = [str(row["estimator"]), str(row["perturbation"] or "(baseline)"), level]
+        if row["not_applicable"]:
+            line.append(f"not applicable: {row['not_applicable']}")
+        else:
+            line += [_number(row["metrics"], key) for _, key in _COLUMNS]
+        lines.append(line)
+    full = [line for line in lines if len(line) == len(lines[0])]
+    widths = [max(len(line[k]) for line in full) for k in range(len(lines[0]))]
+    widths[:3] = [max(len(line[k]) for line in lines) for k in range(3)]
+    return "\n".join(
+        "  ".join(
+            cell.ljust(width) if k < 3 or len(line) < len(widths) else cell.rjust(width)
+            for k, (cell, width) in enumerate(zip(line, widths, strict=False))
+        ).rstrip()
+        for line in lines
+    )
+
+
+def _number(metrics: Metrics, key: str) -> str:
+    value = metrics[key]
+    return "-" if value is None else f"{value:.3f}"

@@ -1,0 +1,62 @@
+"""Scans that never came."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from slamreplay.bundle.view import BundleView
+from slamreplay.errors import NotApplicableError
+from slamreplay.geometry.times import ns
+from slamreplay.perturb.variant import Variant, check_level
+
+
+@dataclass(frozen=True)
+class ScanDrop:
+    """Leave out scans of the laser that plays the scan role.
+
+    A higher ratio with the same seed drops the same scans and more; a longer burst contains the
+    shorter one.
+    """
+
+    name: ClassVar[str] = "scan_drop"
+    variants: ClassVar[dict[str, Variant]] = {
+        "random": Variant("ratio", 0.0, "each scan is lost with this probability", 0, 0.999),
+        "burst": Variant("s", 0.0, "no scan for this long, at a moment the seed chooses", 0, 3600),
+        "even": Variant("ratio", 0.0, "this share of the scans is lost, evenly spread", 0, 0.999),
+    }
+    touches: ClassVar[frozenset[str]] = frozenset({"scans"})
+
+    def apply(
+        self, view: BundleView, variant: str, level: float, rng: np.random.Generator
+    ) -> BundleView:
+        """The view without those scans.
+
+        Raises:
+            NotApplicableError: the log has no scans, or is shorter than the burst.
+            UsageError: the level is out of range.
+        """
+        if level == check_level(self.name, self.variants, variant, level).baseline:
+            return view
+        table = view.table("scans")
+        rows = np.flatnonzero(table["topic"] == view.manifest.topic_of("scan"))
+        if not len(rows):
+            raise NotApplicableError("the log has no scans to drop", where=self.name)
+        rows = rows[np.argsort(table.t_ns[rows], kind="stable")]
+        if variant == "random":
+            drop = rng.random(len(rows)) < level
+        elif variant == "even":
+            counted = np.floor((np.arange(len(rows) + 1)) * level)
+            drop = np.diff(counted) > 0
+        else:
+            t_ns = table.t_ns[rows]
+            spare = int(t_ns[-1] - t_ns[0]) - ns(level)
+            if spare < 0:
+                raise NotApplicableError(f"the log is shorter than {level:g} s", where=self.name)
+            start = t_ns[0] + int(rng.random() * spare)
+            drop = (t_ns >= start) & (t_ns < start + ns(level))
+        keep = np.ones(len(table), dtype=bool)
+        keep[rows[drop]] = False
+        return view.with_table(table.take(keep))

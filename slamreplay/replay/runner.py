@@ -1,0 +1,135 @@
+"""Trials in, runs out; what was computed before comes from the cache."""
+
+from __future__ import annotations
+
+import hashlib
+import inspect
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import asdict
+from functools import cache as once
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import slamreplay
+from slamreplay.bundle.atomic import write_file
+from slamreplay.bundle.run import Run, Trial, read_run, run_bytes
+from slamreplay.bundle.view import Bundle, BundleView
+from slamreplay.errors import BundleError, NotApplicableError, OutputError, UsageError
+from slamreplay.estimators import ESTIMATORS
+from slamreplay.perturb import PERTURBATIONS
+
+#: Random numbers of the perturbation do not depend on how many the estimator draws.
+_PERTURBATION_STREAM = 1
+#: Packages whose code an estimate depends on.
+_CODE = ("geometry", "maps", "matching", "graph", "bundle", "perturb", "estimators", "replay")
+
+
+def replay(
+    bundle: Bundle,
+    trials: Sequence[Trial],
+    *,
+    progress: Callable[[str, float], None] | None = None,
+    cache: Path | None = None,
+) -> list[Run]:
+    """A run for each trial, in their order.
+
+    A trial that the log or the estimator does not allow gives a run without an estimate that says
+    why.
+
+    Args:
+        bundle: the evidence.
+        trials: of this bundle.
+        progress: told what is being done, and the share done.
+        cache: folder of earlier runs; one that cannot be written is not used.
+
+    Raises:
+        UsageError: a trial is of another bundle, or names what does not exist.
+    """
+    runs = []
+    for done, trial in enumerate(trials):
+        if trial.bundle_id != bundle.manifest.bundle_id:
+            raise UsageError(f"trial {trial.id} is of another bundle", where=trial.bundle_id)
+        if progress is not None:
+            progress(_words(trial), done / len(trials))
+        runs.append(_cached(bundle, trial, cache))
+    if progress is not None:
+        progress("replayed", 1.0)
+    return runs
+
+
+def run_trial(bundle: Bundle, trial: Trial) -> Run:
+    """One run, computed afresh."""
+    estimator = ESTIMATORS.load(trial.estimator)()
+    view = bundle.view()
+    try:
+        if trial.perturbation is not None and trial.level is not None:
+            name, _, variant = trial.perturbation.partition(".")
+            stream = np.random.SeedSequence([trial.seed, _PERTURBATION_STREAM])
+            rng = np.random.Generator(np.random.PCG64(stream))
+            view = PERTURBATIONS.load(name)().apply(view, variant, trial.level, rng)
+        _refuse_ignored(view, estimator)
+        return Run(trial, estimator.run(view, seed=trial.seed))
+    except NotApplicableError as reason:
+        return Run(trial, None, str(reason))
+
+
+def _refuse_ignored(view: BundleView, estimator: Any) -> None:
+    """A setting that is not honoured would pass the baseline off as a trial."""
+    ignored = sorted(set(view.settings) - estimator.settings)
+    if ignored:
+        raise NotApplicableError(f"has no setting {', '.join(ignored)}", where=estimator.name)
+
+
+def _cached(bundle: Bundle, trial: Trial, cache: Path | None) -> Run:
+    if cache is None or bundle.path is None:
+        return run_trial(bundle, trial)
+    file = cache / f"{_key(trial)}.npz"
+    if file.is_file():
+        try:
+            return read_run(file)
+        except BundleError:
+            pass  # damaged, or of an older version: computed again and replaced
+    run = run_trial(bundle, trial)
+    try:
+        cache.mkdir(parents=True, exist_ok=True)
+        write_file(file, run_bytes(run))
+    except (OSError, OutputError):
+        pass  # a cache that cannot be written costs time, nothing else
+    return run
+
+
+def _key(trial: Trial) -> str:
+    """Hash of everything a run depends on: evidence, trial, configuration, code, numpy."""
+    estimator = ESTIMATORS.load(trial.estimator)
+    parts = [json.dumps(asdict(trial)), repr(estimator()), _code(), np.__version__]
+    parts.append(_source(estimator))
+    if trial.perturbation is not None:
+        perturbation = PERTURBATIONS.load(trial.perturbation.partition(".")[0])
+        parts += [repr(perturbation()), _source(perturbation)]
+    return hashlib.sha256("\0".join(parts).encode()).hexdigest()
+
+
+@once
+def _code() -> str:
+    root = Path(slamreplay.__file__).parent
+    digest = hashlib.sha256()
+    for file in sorted(f for name in _CODE for f in (root / name).rglob("*.py")):
+        digest.update(file.relative_to(root).as_posix().encode() + b"\0" + file.read_bytes())
+    return digest.hexdigest()
+
+
+def _source(thing: Any) -> str:
+    """The file a plug-in comes from: ours are hashed with the package already."""
+    try:
+        return Path(inspect.getfile(thing)).read_text(encoding="utf-8")
+    except (OSError, TypeError):
+        return repr(thing)
+
+
+def _words(trial: Trial) -> str:
+    if trial.perturbation is None:
+        return f"{trial.estimator}, baseline"
+    return f"{trial.estimator}, {trial.perturbation} {trial.level:g} {trial.unit}"
