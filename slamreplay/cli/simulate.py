@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from slamreplay.cli.options import Json
 from slamreplay.errors import UsageError
 from slamreplay.simulate import SCENARIOS
 
@@ -42,6 +44,7 @@ def _simulate(
     samples: Annotated[
         bool, typer.Option("--samples", help="Make all sample logs anew, in the folder -o.")
     ] = False,
+    as_json: Json = False,
 ) -> None:
     from slamreplay.cli.progress import progress_bar
 
@@ -59,4 +62,7 @@ def _simulate(
             write_samples(output, progress=progress)
         else:
             simulate(scenario, output, seed=seed)
-    typer.echo(str(output))
+    if as_json:
+        typer.echo(json.dumps({"scenario": scenario, "seed": seed, "log": str(output)}))
+    else:
+        typer.echo(str(output))

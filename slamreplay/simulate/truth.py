@@ -81,7 +81,7 @@ def total_s(
 def verdict(
     t_s: se2.Array, far: NDArray[np.bool_], scan_t_s: se2.Array, changed_share: se2.Array
 ) -> str:
-    """The state of a whole log: from where the belief was far off, and each scan's changed share."""
+    """The state of a log, from when the belief was far off and each scan's changed share."""
     lost = total_s(t_s, far, _LOST_FOR_S) >= _LOG_FOR_S
     changed = total_s(scan_t_s, changed_share > _CHANGED_SHARE, _CHANGED_FOR_S) >= _LOG_FOR_S
     if lost and changed:
