@@ -9,8 +9,9 @@ from slamreplay.bundle.manifest import Frames, Loss
 from slamreplay.bundle.view import ROLE_TABLES
 from slamreplay.errors import UsageError
 from slamreplay.ingest import roles
-from slamreplay.ingest.frames import find_frames, settle
-from slamreplay.ingest.names import is_map_frame, tokens
+from slamreplay.ingest.frames import find_frames, settle, without_frame
+from slamreplay.ingest.leaks import repeated_reference
+from slamreplay.ingest.names import is_map_frame, is_reference, tokens
 from slamreplay.ingest.roles import Choice
 from slamreplay.ingest.rows import TopicRows
 
@@ -58,16 +59,28 @@ def settle_cast(topics: Sequence[TopicRows], overrides: Mapping[str, str]) -> Ca
     found |= given
     odometry = found["odometry"]
     map_frames = _map_frames(others, found)
-    frames = find_frames(tree, odometry.rows if odometry else None, map_frames, overrides)
+    references = [t for t in others if is_reference(t.topic) and t.table in ("poses", "odometry")]
+    disguised: dict[str, str] = {}
+
+    def is_disguise(frame: str, odom: str, base: str) -> bool:
+        topic = repeated_reference(frame, odom, base, tf_rows, references)
+        if topic is not None:
+            disguised[frame] = topic
+        return topic is not None
+
+    odometry_rows = odometry.rows if odometry else None
+    frames = find_frames(tree, odometry_rows, map_frames, overrides, is_disguise)
+    for frame, topic in disguised.items():
+        if frame != frames.map:
+            frames, tf_rows, loss = without_frame(frame, topic, frames, tf_rows)
+            losses.append(loss)
     initial = [t for t in free("initial_pose") if roles.is_initial_pose(t)]
     found |= {
         "pose": roles.choose_pose([*free("pose"), *tf_rows], frames),
         "initial_pose": roles.choose_simple(initial, "poses", "named as one", ("initialpose",)),
         "points": roles.choose_simple(free("points"), "points", "point cloud", ("points",)),
         "plan": roles.choose_simple(free("plan"), "plans", "nav_msgs/Path", ("plan", "path")),
-        "command": roles.choose_simple(
-            free("command"), "commands", "velocity command", ("cmd_vel", "command")
-        ),
+        "command": roles.choose_command(free("command")),
         "recovery": roles.choose_simple(free("recovery"), "recoveries", "recovery actions", ()),
     }
     found |= given

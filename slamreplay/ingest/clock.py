@@ -87,8 +87,8 @@ def row_times(topic: TopicRows, clock: Clock) -> tuple[Times, list[Loss]]:
     return np.where(stamped & ~foreign, topic.t_sensor_ns, from_log), losses
 
 
-#: Types without a header: a log time is all they ever had.
-_UNSTAMPED = frozenset({"geometry_msgs/msg/Twist"})
+#: What has no header: a log time is all it ever had.
+_UNSTAMPED = frozenset({"geometry_msgs/msg/Twist", "map_server"})
 
 
 def _static(topic: TopicRows) -> bool:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -40,7 +40,8 @@ def settle(topics: Sequence[TopicRows]) -> tuple[list[TopicRows], list[FrameEdge
         edges[edge.parent, edge.child] = replace(edge, is_static=True)
     if held:
         count = sum(e.samples for e in held)
-        reason = f"{len(held)} edges of /tf never change: held at all times"
+        what = "edge never changes" if len(held) == 1 else "edges never change"
+        reason = f"{len(held)} {what}: held at all times"
         losses.append(Loss(kind="repaired", what="tf", count=count, reason=reason))
     dropped = _second_parents(edges)
     kept = {pair: edge for pair, edge in edges.items() if pair not in dropped}
@@ -59,6 +60,7 @@ def find_frames(
     odometry: TopicRows | None,
     map_frames: Sequence[str],
     given: Mapping[str, str],
+    is_disguise: Callable[[str, str, str], bool],
 ) -> Frames:
     """map, odom and base of a log.
 
@@ -67,6 +69,7 @@ def find_frames(
         odometry: rows of the odometry topic, where there is one.
         map_frames: frames that poses in a map or a map itself are given in, best first.
         given: frames the user named ("map_frame", "odom_frame", "base_frame").
+        is_disguise: whether a frame, beside an odom with a base, is a reference's and no map's.
     """
     moving = [e for e in tree if not e.is_static]
     known = {f for e in tree for f in (e.parent, e.child)}
@@ -87,12 +90,29 @@ def find_frames(
     beside = {e.parent for e in tree if e.child == odom} | {
         e.child for e in tree if e.parent == odom and e.child != base
     }
-    candidates = [f for f in beside if is_map_frame(f)]
+    candidates = [f for f in sorted(beside) if is_map_frame(f)]
+    if len(candidates) > 1 and odom is not None and base is not None:
+        candidates = [f for f in candidates if not is_disguise(f, odom, base)] or candidates
     map_frame = given.get("map_frame") or _best(candidates)
     if map_frame is None:
         likely = [f for f in map_frames if f in beside] or [f for f in map_frames if f]
         map_frame = likely[0] if likely else _best([f for f in known if is_map_frame(f)])
     return Frames(map=map_frame, odom=odom, base=base, tree=list(tree))
+
+
+def without_frame(
+    frame: str, reference: str, frames: Frames, topics: Sequence[TopicRows]
+) -> tuple[Frames, list[TopicRows], Loss]:
+    """Frames and tf rows without the edges of a frame that only repeats a reference."""
+    kept, count = [], 0
+    for topic in topics:
+        own = (topic.columns["parent_frame"] == frame) | (topic.columns["child_frame"] == frame)
+        count += int(own.sum())
+        kept.append(topic.take(np.flatnonzero(~own)))
+    tree = [e for e in frames.tree if frame not in (e.parent, e.child)]
+    reason = f"repeats the reference {reference}, which only judges"
+    loss = Loss(kind="skipped", what=f"tf frame {frame}", count=count, reason=reason)
+    return frames.model_copy(update={"tree": tree}), kept, loss
 
 
 def _best(frames: Sequence[str]) -> str | None:

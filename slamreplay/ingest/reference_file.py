@@ -39,7 +39,8 @@ def read_reference(path: Path, frame_id: str, child: str) -> tuple[TopicRows, li
     except (OSError, UnicodeDecodeError) as error:
         raise LogError(f"cannot read the reference: {error}", where=path) from error
     names: Sequence[str] = _TUM
-    t_ns, numbers = [], []
+    t_ns: list[int] = []
+    numbers: list[list[float]] = []
     for number, line in enumerate(text.splitlines(), start=1):
         cells = re.split(r"[,;\s]+", line.strip().rstrip(",;"))
         if not line.strip() or line.lstrip().startswith("#"):

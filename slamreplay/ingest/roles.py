@@ -162,6 +162,16 @@ def choose_simple(
     return _pick(found, rank, what, "by name, then most messages")
 
 
+def choose_command(topics: Sequence[TopicRows]) -> Choice | None:
+    """What the base was told; a stamped twist without such a name may be a measurement."""
+    named = {"cmd", "command"}
+    found = [
+        t for t in topics if t.table == "commands" and len(t)
+        and (t.type.endswith("/Twist") or named & set(tokens(t.topic)))
+    ]  # fmt: skip
+    return choose_simple(found, "commands", "velocity command", ("cmd_vel", "command"))
+
+
 def _pick(found: Sequence[TopicRows], rank: Rank, what: str, order: str) -> Choice | None:
     if not found:
         return None

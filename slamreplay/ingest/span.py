@@ -25,7 +25,7 @@ def evidence_span(tables: Mapping[str, Table], frames: Frames, log: Path) -> tup
     """
     times = [tables[name].t_ns for name in ("scans", "odometry") if _rows(tables, name)]
     moving = _moving(tables, frames)
-    if len(moving):
+    if len(moving) and not _rows(tables, "odometry"):
         times.append(moving)
     if not times and _rows(tables, "poses") and _rows(tables, "references"):
         times = [tables["poses"].t_ns, tables["references"].t_ns]

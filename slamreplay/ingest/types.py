@@ -75,6 +75,6 @@ def _needed(definitions: Typesdict) -> set[str]:
     for _, fields in definitions.values():
         for _, (kind, args) in fields:
             inner = args[0] if kind in {Nodetype.ARRAY, Nodetype.SEQUENCE} else (kind, args)
-            if inner[0] == Nodetype.NAME:
-                names.add(inner[1])
+            if isinstance(inner, tuple) and inner[0] == Nodetype.NAME:
+                names.add(str(inner[1]))
     return names

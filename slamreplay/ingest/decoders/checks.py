@@ -20,8 +20,8 @@ def pose_rows(
     """Unit quaternions (N, 4), the mask (N,) of usable poses, and remarks on the others."""
     position = np.asarray(position_xyz, dtype=np.float64)
     unit, sound = se3.unit_quaternion(orientation_xyzw)
-    turned = np.isfinite(unit).all(axis=1)
-    placed = np.isfinite(position).all(axis=1)
+    turned: NDArray[np.bool_] = np.asarray(np.isfinite(unit).all(axis=1))
+    placed: NDArray[np.bool_] = np.asarray(np.isfinite(position).all(axis=1))
     remarks = (
         Remark("repaired", int((turned & placed & ~sound).sum()), "quaternion normalised"),
         Remark("lost", int((~turned).sum()), "quaternion is zero or not finite"),

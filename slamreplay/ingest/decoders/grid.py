@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -23,7 +25,7 @@ def _decode(messages: Messages, meta: str, width: str, height: str, cells: Ragge
     unset = (raw == 0.0).all(axis=1)  # common in costmaps: nobody filled it in
     raw[unset] = (0.0, 0.0, 0.0, 1.0)
     orientation, keep, remarks = pose_rows(position, raw)
-    columns = {
+    columns: dict[str, Any] = {
         "frame_id": messages.frames(),
         "resolution_m": messages.column(f"{meta}.resolution").astype(np.float32).astype(float),
         "width": messages.column(f"{meta}.{width}", np.int64),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from slamreplay.geometry.times import Times
@@ -28,9 +30,9 @@ def _log(messages: Messages) -> Decoded:
     return Decoded(columns, messages.every, stamps)
 
 
-def _number(level: object) -> int:
+def _number(level: Any) -> int:
     """ROS 2 declares the level of a diagnostic as `byte`, which arrives as bytes of length 1."""
-    return level[0] if isinstance(level, bytes) else int(level)  # type: ignore[call-overload, no-any-return]
+    return int(level[0] if isinstance(level, bytes) else level)
 
 
 DIAGNOSTICS = Decoder("health", _diagnostics)

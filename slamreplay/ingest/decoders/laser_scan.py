@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from slamreplay.ingest.decoders.checks import kept
@@ -10,7 +12,7 @@ from slamreplay.ingest.decoders.decoder import Decoded, Decoder, Messages, Remar
 
 def _decode(messages: Messages) -> Decoded:
     ranges = messages.ragged("ranges", np.float32)
-    columns = {
+    columns: dict[str, Any] = {
         "frame_id": messages.frames(),
         "angle_min_rad": messages.column("angle_min"),
         "angle_increment_rad": messages.column("angle_increment"),

@@ -14,7 +14,7 @@ def _decode(messages: Messages, path: str, t_sensor_ns: Times) -> Decoded:
         "linear_velocity_xyz": messages.columns(f"{path}linear", "xyz"),
         "angular_velocity_xyz": messages.columns(f"{path}angular", "xyz"),
     }
-    keep = np.isfinite(np.column_stack(list(columns.values()))).all(axis=1)
+    keep = np.asarray(np.isfinite(np.column_stack(list(columns.values()))).all(axis=1))
     remarks = (Remark("lost", int((~keep).sum()), "velocity is not finite"),)
     return kept(keep, columns, messages.every, t_sensor_ns, remarks)
 

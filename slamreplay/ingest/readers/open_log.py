@@ -17,6 +17,11 @@ from slamreplay.ingest.readers import mcap_file, ros1, sqlite_file
 from slamreplay.ingest.readers.reader import Reader
 
 _ZSTD = b"\x28\xb5\x2f\xfd"
+_KINDS: list[tuple[bytes, str, Callable[[Path, Source], Reader]]] = [
+    (ros1.MAGIC, "ros1", ros1.Ros1Reader),
+    (mcap_file.MAGIC, "mcap", mcap_file.McapReader),
+    (sqlite_file.MAGIC, "sqlite3", sqlite_file.SqliteReader),
+]
 _SUFFIXES = {".bag", ".mcap", ".db3", ".zstd"}
 
 
@@ -102,12 +107,7 @@ def _open(path: Path, digest: str, compression: str, stack: ExitStack) -> Reader
     if head.startswith(_ZSTD):
         file = _decompressed(path, stack)
         head = _head(file)
-    kinds: list[tuple[bytes, str, Callable[[Path, Source], Reader]]] = [
-        (ros1.MAGIC, "ros1", ros1.Ros1Reader),
-        (mcap_file.MAGIC, "mcap", mcap_file.McapReader),
-        (sqlite_file.MAGIC, "sqlite3", sqlite_file.SqliteReader),
-    ]
-    for magic, name, reader in kinds:
+    for magic, name, reader in _KINDS:
         if head.startswith(magic):
             size = path.stat().st_size
             source = Source(name=path.name, format=name, bytes=size, sha256=digest)

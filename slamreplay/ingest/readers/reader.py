@@ -33,17 +33,22 @@ class Connection:
 
 
 class Reader(Protocol):
-    """A container opened for reading.
+    """A container opened for reading."""
 
-    Attributes:
-        sources: the files behind it.
-        connections: in the order of their `index`.
-        losses: what could not be read; complete once `messages` was exhausted.
-    """
+    @property
+    def sources(self) -> tuple[Source, ...]:
+        """The files behind it."""
+        ...
 
-    sources: tuple[Source, ...]
-    connections: tuple[Connection, ...]
-    losses: list[Loss]
+    @property
+    def connections(self) -> tuple[Connection, ...]:
+        """In the order of their `index`."""
+        ...
+
+    @property
+    def losses(self) -> list[Loss]:
+        """What could not be read; complete once `messages` was exhausted."""
+        ...
 
     def messages(self, wanted: Collection[int]) -> Iterator[tuple[int, int, bytes]]:
         """Connection index, log time in ns and payload of the wanted connections' messages."""

@@ -147,7 +147,7 @@ def _decompress(data: bytes, compression: str) -> bytes:
     if compression == "bz2":
         return bz2.decompress(data)
     if compression == "lz4":
-        import lz4.frame
+        import lz4.frame  # type: ignore[import-untyped]
 
         return bytes(lz4.frame.decompress(data))
     raise ValueError(f"unknown compression '{compression}'")
