@@ -1,0 +1,165 @@
+"""The findings that made the verdict."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from slamreplay.bundle.findings import SEVERITIES, Finding, Severity
+from slamreplay.bundle.products import Hindsight
+from slamreplay.bundle.track import PoseTrack
+from slamreplay.bundle.view import BundleView
+from slamreplay.geometry.times import NS_PER_S
+from slamreplay.verdict.belief_error import explained_match
+from slamreplay.verdict.judgement import Interval
+from slamreplay.verdict.limits import Limits
+from slamreplay.verdict.map_frame import ConstantOffset
+
+
+def verdict_findings(
+    view: BundleView,
+    belief: PoseTrack | None,
+    hindsight: Hindsight | None,
+    intervals: Sequence[Interval],
+    offset: ConstantOffset | None,
+    limits: Limits,
+) -> tuple[Finding, ...]:
+    """Worst first; within a severity in time order."""
+    span = (view.manifest.start_ns, view.manifest.end_ns)
+    found: list[Finding] = []
+    if belief is None:
+        text = "no localizer spoke: whether the robot was lost is not judged"
+        found.append(Finding("SR-LOC-003", "warning", text, *span))
+    if view.grid is None:
+        text = "no map in the log and none given: nothing can be judged against it"
+        found.append(Finding("SR-MAP-002", "warning", text, *span))
+    found += [_lost(i, view, limits) for i in intervals if i.is_lost]
+    found += [_changed(i, hindsight, limits) for i in intervals if i.is_changed]
+    if hindsight is not None:
+        found += _unobservable(intervals, hindsight, limits)
+        found += _wrong_map(intervals, hindsight, limits)
+    found += _offset(offset, span)
+    found += _unjudged(intervals, span)
+    return tuple(sorted(found, key=lambda f: (-SEVERITIES.index(f.severity), f.start_ns or 0)))
+
+
+def _lost(i: Interval, view: BundleView, limits: Limits) -> Finding:
+    metres, degrees = i.max_error_m or 0.0, np.degrees(i.max_error_rad or 0.0)
+    since = (i.start_ns - view.manifest.start_ns) / NS_PER_S
+    text = (
+        f"lost for {i.duration_ns / NS_PER_S:.1f} s from {since:.1f} s on: the belief was up to "
+        f"{metres:.2f} m and {degrees:.0f} deg from where the robot really was"
+    )
+    by_heading = metres <= limits.position_m
+    return Finding(
+        "SR-LOC-001",
+        "error",
+        text,
+        i.start_ns,
+        i.end_ns,
+        value=i.max_error_rad if by_heading else i.max_error_m,
+        low=0.0,
+        high=limits.yaw_rad if by_heading else limits.position_m,
+        unit="rad" if by_heading else "m",
+    )
+
+
+def _changed(i: Interval, hindsight: Hindsight | None, limits: Limits) -> Finding:
+    changes = None if hindsight is None else hindsight.changes
+    share = np.empty(0)
+    if changes is not None:
+        inside = (changes.t_ns >= i.start_ns) & (changes.t_ns < i.end_ns)
+        share = changes.changed_share[inside & np.isfinite(changes.changed_share)]
+    most = float(share.max()) if len(share) else None
+    text = (
+        f"for {i.duration_ns / NS_PER_S:.1f} s up to {100 * (most or 0.0):.0f} % of the beams "
+        f"contradict the map where {100 * limits.changed_share:.0f} % are allowed"
+    )
+    return Finding(
+        "SR-MAP-001",
+        "warning",
+        text,
+        i.start_ns,
+        i.end_ns,
+        value=most,
+        low=0.0,
+        high=limits.changed_share,
+        unit="ratio",
+        n=len(share),
+    )
+
+
+def _unobservable(
+    intervals: Sequence[Interval], hindsight: Hindsight, limits: Limits
+) -> list[Finding]:
+    found = [i for i in intervals if i.state == "unobservable"]
+    if not found or hindsight.margin is None:
+        return []
+    text = (
+        f"the best sequence of places beats the best different one by {hindsight.margin:.4f} in "
+        f"mean score per scan; less than {limits.margin:g} is within the noise"
+    )
+    start, end = found[0].start_ns, found[-1].end_ns
+    return [
+        Finding(
+            "SR-LOC-002", "warning", text, start, end, value=hindsight.margin, low=limits.margin
+        )
+    ]
+
+
+def _wrong_map(
+    intervals: Sequence[Interval], hindsight: Hindsight, limits: Limits
+) -> list[Finding]:
+    if not any("SR-MAP-WRONG" in i.findings for i in intervals):
+        return []
+    match = explained_match(hindsight)
+    match = match[np.isfinite(match)]
+    typical = float(np.median(match)) if len(match) else None
+    score = "no scan has a place" if typical is None else f"a typical scan scores {typical:.2f}"
+    text = f"the scans fit nowhere in this map: {score} where {limits.fits_from:.2f} is needed"
+    return [
+        Finding(
+            "SR-MAP-WRONG",
+            "error",
+            text,
+            intervals[0].start_ns,
+            intervals[-1].end_ns,
+            value=typical,
+            low=limits.fits_from,
+            high=1.0,
+            unit="1",
+            n=len(match),
+        )
+    ]
+
+
+def _offset(offset: ConstantOffset | None, span: tuple[int, int]) -> list[Finding]:
+    if offset is None or offset.cause == "lookalike":
+        return []
+    severity: Severity = "error" if offset.cause == "map" else "warning"
+    text = f"belief and map differ by one constant transform over the whole log: {offset.text}"
+    if offset.cause == "map_or_start":
+        text += "; a wrong start that was never corrected explains it equally well"
+    return [
+        Finding(
+            "SR-MAP-FRAME", severity, text, *span, value=offset.at_robot_m, low=0.0, high=0.0,
+            unit="m",
+        )
+    ]  # fmt: skip
+
+
+def _unjudged(intervals: Sequence[Interval], span: tuple[int, int]) -> list[Finding]:
+    unjudged = [i for i in intervals if "SR-LOC-004" in i.findings]
+    if not unjudged:
+        return []
+    total = sum(i.duration_ns for i in unjudged)
+    share = total / max(span[1] - span[0], 1)
+    text = f"{total / NS_PER_S:.1f} s ({100 * share:.0f} % of the log) cannot be judged"
+    severity: Severity = "warning" if share > 0.5 else "info"
+    return [
+        Finding(
+            "SR-LOC-004", severity, text, unjudged[0].start_ns, unjudged[-1].end_ns, value=share,
+            low=0.0, high=0.5, unit="ratio", n=len(unjudged),
+        )
+    ]  # fmt: skip

@@ -1,0 +1,59 @@
+"""Two questions, lost and changed, tiled into intervals of one state."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+from slamreplay.verdict.judgement import Interval, State
+from slamreplay.verdict.limits import Limits
+from slamreplay.verdict.timeline import BAD, UNKNOWN, Timeline
+
+NS_PER_S = 1e9
+
+
+def state_of(lost: int, changed: int) -> State:
+    """The state of a moment. A question that is answered with yes stands, whatever the other one.
+
+    Where neither is, one that cannot be answered makes the moment one that cannot be judged.
+    """
+    if lost == BAD:
+        return "lost_and_map_changed" if changed == BAD else "lost"
+    if changed == BAD:
+        return "map_changed"
+    return "insufficient_data" if UNKNOWN in (lost, changed) else "healthy"
+
+
+def tiled(lost: Timeline, changed: Timeline) -> tuple[Interval, ...]:
+    """Intervals over two timelines of the same span: each starts where the last one ended."""
+    edges = sorted({s.start_ns for s in (*lost, *changed)} | {s.end_ns for s in (*lost, *changed)})
+    out: list[Interval] = []
+    for start, end in pairwise(edges):
+        state = state_of(_value(lost, start), _value(changed, start))
+        if out and out[-1].state == state:
+            start = out.pop().start_ns
+        out.append(Interval(state, start, end))
+    return tuple(out)
+
+
+def log_state(intervals: Sequence[Interval], limits: Limits) -> State:
+    """The state of the whole log from the total times of its intervals."""
+    lost = sum(i.duration_ns for i in intervals if i.is_lost) / NS_PER_S
+    changed = sum(i.duration_ns for i in intervals if i.is_changed) / NS_PER_S
+    whole = sum(i.duration_ns for i in intervals)
+    if lost >= limits.total_s and changed >= limits.total_s:
+        return "lost_and_map_changed"
+    if lost >= limits.total_s:
+        return "lost"
+    if changed >= limits.total_s:
+        return "map_changed"
+    unobservable = sum(i.duration_ns for i in intervals if i.state == "unobservable")
+    unjudged = sum(i.duration_ns for i in intervals if i.state == "insufficient_data")
+    if 2 * unobservable > whole:
+        return "unobservable"
+    # A log of no length at all cannot be judged either.
+    return "insufficient_data" if 2 * (unjudged + unobservable) > whole or not whole else "healthy"
+
+
+def _value(timeline: Timeline, t_ns: int) -> int:
+    return next((s.value for s in timeline if s.start_ns <= t_ns < s.end_ns), UNKNOWN)

@@ -1,0 +1,171 @@
+"""The verdict: one log's belief against hindsight, and what the robot did with it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from slamreplay.bundle.findings import Finding
+from slamreplay.bundle.products import Hindsight
+from slamreplay.bundle.track import PoseTrack
+from slamreplay.bundle.view import BundleView
+from slamreplay.verdict.actions import actions, risky
+from slamreplay.verdict.belief_error import fits_nowhere
+from slamreplay.verdict.failure_mode import failure_mode
+from slamreplay.verdict.findings import verdict_findings
+from slamreplay.verdict.intervals import log_state
+from slamreplay.verdict.judgement import FailureMode, Interval, Judgement, State
+from slamreplay.verdict.limits import Limits
+from slamreplay.verdict.stops import stop_findings, stops
+from slamreplay.verdict.summary import summary
+from slamreplay.verdict.tiles import Evidence, gathered, intervals_of
+
+_DEFAULT = Limits()
+
+
+def judge(
+    view: BundleView,
+    belief: PoseTrack | None,
+    hindsight: Hindsight | None,
+    limits: Limits = _DEFAULT,
+) -> Judgement:
+    """Was it lost, or had the world changed?
+
+    The covariance alone decides nothing: lost is the belief's distance from hindsight, changed is
+    what the scans, cast from there, contradict. Where hindsight itself cannot be trusted the moment
+    is not judged.
+
+    Args:
+        view: the log; references that only judge are not in it.
+        belief: base in map at every scan as the robot believed it, None where no localizer spoke.
+        hindsight: where it really was, None without a map or without scans.
+        limits: thresholds.
+    """
+    if belief is not None and not belief.has_pose.any():
+        belief = None
+    if hindsight is None or not len(hindsight.track) or fits_nowhere(hindsight, limits):
+        return _unjudged(view, belief, hindsight, limits)
+    if hindsight.margin is not None and hindsight.margin < limits.margin:
+        return _unjudged(view, belief, hindsight, limits, ambiguous=True)
+    evidence = gathered(view, belief, hindsight, limits)
+    intervals = intervals_of(view, evidence, limits)
+    state = log_state(intervals, limits)
+    mode = _mode(view, belief, hindsight, evidence, intervals, limits)
+    found_stops = stops(view, belief, hindsight.track, intervals)
+    done = actions(view, belief, limits)
+    reason = "hindsight does not know where it was for most of the log"
+    text = summary(
+        state,
+        intervals,
+        mode,
+        found_stops,
+        evidence.changes,
+        evidence.offset,
+        start_ns=view.manifest.start_ns,
+        has_belief=belief is not None,
+        reason=reason,
+    )
+    findings = (
+        *verdict_findings(view, belief, hindsight, intervals, evidence.offset, limits),
+        *risky(done),
+        *stop_findings(found_stops, view.manifest.start_ns),
+    )
+    sure = _log_confidence(state, intervals)
+    return Judgement(state, sure, text, intervals, mode, found_stops, done, findings)
+
+
+def _mode(
+    view: BundleView,
+    belief: PoseTrack | None,
+    hindsight: Hindsight,
+    evidence: Evidence,
+    intervals: tuple[Interval, ...],
+    limits: Limits,
+) -> FailureMode:
+    offset = evidence.offset
+    if offset is not None and offset.cause == "map":
+        spread = f"nine of ten moments within {offset.spread_m:.2f} m of it"
+        words = (
+            f"belief and map differ by one constant transform, {offset.text}: {spread}",
+            "the localizer kept correcting its odometry, so its scans fitted the map it had",
+        )
+        return FailureMode("wrong_map", 0.9, words)
+    error = evidence.error
+    sigma = np.full(len(error.t_ns), np.nan)
+    if belief is not None:
+        cov = belief.at(error.t_ns).cov[:, :2, :2]
+        u = (error.belief - error.where)[:, :2]
+        u = u / np.maximum(np.hypot(u[:, 0], u[:, 1]), 1e-9)[:, None]
+        with np.errstate(invalid="ignore"):
+            sigma = np.sqrt(np.einsum("ni,nij,nj->n", u, cov, u))
+    mode = failure_mode(view, error, hindsight, intervals, sigma, limits)
+    if offset is not None and offset.cause == "map_or_start" and mode.kind != "none":
+        text = f"a map frame shifted by {offset.text} would explain it equally well"
+        mode = replace(mode, confidence=0.5, evidence=(*mode.evidence, text))
+    return mode
+
+
+def _log_confidence(state: State, intervals: tuple[Interval, ...]) -> float | None:
+    """The mean of the intervals that made the state, each by its length; None if undecided."""
+    if state in ("insufficient_data", "unobservable"):
+        return None
+    wants = {
+        "lost": ("lost", "lost_and_map_changed"),
+        "map_changed": ("map_changed", "lost_and_map_changed"),
+        "lost_and_map_changed": ("lost", "map_changed", "lost_and_map_changed"),
+        "healthy": ("healthy",),
+    }[state]
+    made = [(i.confidence, i.duration_ns) for i in intervals if i.state in wants]
+    sure = [(c, weight) for c, weight in made if c is not None]
+    if not sure:
+        return None
+    return sum(c * weight for c, weight in sure) / sum(weight for _, weight in sure)
+
+
+def _unjudged(
+    view: BundleView,
+    belief: PoseTrack | None,
+    hindsight: Hindsight | None,
+    limits: Limits,
+    *,
+    ambiguous: bool = False,
+) -> Judgement:
+    """A log of which nothing can be said, as one interval; what the robot did still stands."""
+    state: State = "unobservable" if ambiguous else "insufficient_data"
+    ids: tuple[str, ...] = ("SR-LOC-002",)
+    reason = ""
+    mode = FailureMode("none", None, ())
+    if not ambiguous:
+        ids, reason = ("SR-LOC-004",), "too few scans were recorded"
+        if view.grid is None:
+            ids, reason = ("SR-MAP-002",), "there is no map to compare with"
+        elif hindsight is None:
+            reason = "there are no scans to compare with the map"
+        elif len(hindsight.track):
+            ids, reason = ("SR-MAP-WRONG",), "its scans fit nowhere in this map"
+            words = ("no place in the map explains the scans: another floor, scale or building",)
+            mode = FailureMode("wrong_map", 0.7, words)
+    else:
+        mode = FailureMode("sensing_ambiguity", 0.7, ("two places explain all scans equally well",))
+    start = view.manifest.start_ns
+    whole = (Interval(state, start, max(view.manifest.end_ns, start + 1), findings=ids),)
+    found_stops = stops(view, belief, None, whole)
+    done = actions(view, belief, limits)
+    text = summary(
+        state,
+        whole,
+        mode,
+        found_stops,
+        None,
+        None,
+        start_ns=start,
+        has_belief=belief is not None,
+        reason=reason,
+    )
+    findings: tuple[Finding, ...] = (
+        *verdict_findings(view, belief, hindsight, whole, None, limits),
+        *risky(done),
+        *stop_findings(found_stops, start),
+    )
+    return Judgement(state, None, text, whole, mode, found_stops, done, findings)

@@ -1,0 +1,147 @@
+"""SR-MAP-FRAME: the belief is off by one constant transform over the whole log.
+
+Then either the map that is judged against lies elsewhere than the robot's own, or the robot was put
+down wrongly and never corrected. The first is sure where the localizer kept correcting its odometry
+and stayed at the same offset although its scans do not fit this map there; where they fit as well
+as in the right place, it sat in a look-alike place and was lost.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from slamreplay.bundle.odometry import odometry_track
+from slamreplay.bundle.scans import scan_set
+from slamreplay.bundle.view import BundleView
+from slamreplay.geometry import se2
+from slamreplay.verdict.belief_error import BeliefError
+from slamreplay.verdict.limits import Limits
+
+#: The offset is constant where nine of ten rows stay this close to it, and it covers this share of
+#: what was judged, over at least so many seconds.
+SPREAD_M, SPREAD_RAD, SHARE, MIN_S = 0.25, np.radians(5.0), 0.8, 10.0
+#: A localizer that moved the belief by this much against its odometry was correcting it.
+CORRECTED_M, CORRECTED_RAD = 0.15, np.radians(4.0)
+#: A scan at the believed place that scores this part of what it scores at the right one fits.
+LOOKALIKE = 0.9
+_SCANS = 60
+
+Cause = Literal["map", "map_or_start", "lookalike"]
+
+
+@dataclass(frozen=True)
+class ConstantOffset:
+    """Belief = offset after hindsight, all along.
+
+    Attributes:
+        xyyaw: (3,) the transform, in the map frame: m, m, rad.
+        at_robot_m: median distance it makes where the robot was.
+        at_robot_rad: its turn.
+        spread_m: nine of ten rows stay within this of it.
+        cause: map, map_or_start (both explain it equally) or lookalike (the robot was lost).
+    """
+
+    xyyaw: tuple[float, float, float]
+    at_robot_m: float
+    at_robot_rad: float
+    spread_m: float
+    cause: Cause
+
+    @property
+    def text(self) -> str:
+        """The offset in words."""
+        turn = np.degrees(self.xyyaw[2])
+        return f"x {self.xyyaw[0]:+.2f} m, y {self.xyyaw[1]:+.2f} m, {turn:+.1f} deg"
+
+
+def constant_offset(view: BundleView, error: BeliefError, limits: Limits) -> ConstantOffset | None:
+    """The one transform between belief and hindsight, None where there is none worth a word."""
+    rows = error.known & np.isfinite(error.distance_m)
+    judged = error.known & error.spoken
+    if rows.sum() < 10 or rows.sum() < SHARE * judged.sum():
+        return None
+    if (error.t_ns[rows][-1] - error.t_ns[rows][0]) / 1e9 < MIN_S:
+        return None
+    offset = _aligned(error.where[rows], error.belief[rows])
+    rest = error.belief[rows] - se2.compose(offset, error.where[rows])
+    spread_m = float(np.quantile(np.hypot(rest[:, 0], rest[:, 1]), 0.9))
+    spread_rad = float(np.quantile(np.abs(se2.wrap_angle(rest[:, 2])), 0.9))
+    at_robot_m = float(np.median(error.distance_m[rows]))
+    at_robot_rad = float(abs(offset[2]))
+    if at_robot_m < limits.frame_offset_m and at_robot_rad < limits.frame_offset_rad:
+        return None
+    if spread_m > min(SPREAD_M, max(0.5 * at_robot_m, 0.05)) or spread_rad > SPREAD_RAD:
+        return None
+    cause: Cause = "map_or_start"
+    if _corrected(view, error, rows, spread_m):
+        cause = "lookalike" if _fits_at_belief(view, error, rows) else "map"
+    whole = (float(offset[0]), float(offset[1]), float(offset[2]))
+    return ConstantOffset(whole, at_robot_m, at_robot_rad, spread_m, cause)
+
+
+def _aligned(source: se2.Array, target: se2.Array) -> se2.Array:
+    """(3,) the transform that takes poses (N, 3) onto others, by headings and medians.
+
+    Headings carry the turn: they do not need the robot to have driven far. A path longer than a few
+    metres gives it better (planar Procrustes).
+    """
+    turns = se2.wrap_angle(target[:, 2] - source[:, 2])
+    yaw = float(np.arctan2(np.median(np.sin(turns)), np.median(np.cos(turns))))
+    a, b = (p[:, :2] - np.median(p[:, :2], axis=0) for p in (source, target))
+    if np.sqrt((a**2).sum(axis=1).mean()) > 2.0:
+        cross = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
+        better = float(np.arctan2(cross.sum(), (a * b).sum()))
+        yaw = better if abs(se2.wrap_angle(better - yaw)) < SPREAD_RAD else yaw
+    turned = se2.compose(np.array([0.0, 0.0, yaw]), source)
+    shift = np.median(target[:, :2] - turned[:, :2], axis=0)
+    return np.array([shift[0], shift[1], yaw])
+
+
+def _corrected(view: BundleView, error: BeliefError, rows: np.ndarray, spread_m: float) -> bool:
+    """Whether the localizer moved the belief against its odometry by more than noise."""
+    odometry = odometry_track(view)
+    if odometry is None or not len(odometry):
+        return False
+    odom = odometry.at(error.t_ns[rows]).xyyaw
+    sound = np.isfinite(odom).all(axis=1)
+    if sound.sum() < 2:
+        return False
+    believed, odom = error.belief[rows][sound], odom[sound]
+    carried = se2.compose(believed[0], se2.between(odom[0], odom))
+    moved = np.hypot(*(believed - carried)[:, :2].T)
+    turned = np.abs(se2.wrap_angle(believed[:, 2] - carried[:, 2]))
+    far = float(np.quantile(moved, 0.9)) > max(CORRECTED_M, 3.0 * spread_m)
+    return bool(far or np.quantile(turned, 0.9) > CORRECTED_RAD)
+
+
+def _fits_at_belief(view: BundleView, error: BeliefError, rows: np.ndarray) -> bool:
+    """Whether the scans fit this map at the believed poses as well as at hindsight's."""
+    from slamreplay.maps.likelihood_field import gaussian_field
+
+    scans, grid = scan_set(view), view.grid
+    if scans is None or grid is None:
+        return False
+    field = gaussian_field(grid, 0.12, 1.0)
+    index = np.flatnonzero(rows)
+    index = index[np.linspace(0, len(index) - 1, min(_SCANS, len(index))).astype(int)]
+    scores = []
+    for i in index:
+        k = int(np.searchsorted(scans.t_ns, error.t_ns[i]))
+        if k >= len(scans) or scans.t_ns[k] != error.t_ns[i]:
+            continue
+        points = scans.points(k)
+        if not len(points):
+            continue
+        pair = []
+        for pose in (error.belief[i], error.where[i]):
+            cell = grid.cell_of(se2.transform_points(pose, points))
+            inside = grid.inside(cell)
+            pair.append(float(field[cell[inside, 0], cell[inside, 1]].sum()) / len(points))
+        scores.append(pair)
+    if not scores:
+        return False
+    at_belief, at_hindsight = np.mean(scores, axis=0)
+    return bool(at_belief >= LOOKALIKE * at_hindsight)

@@ -1,0 +1,122 @@
+"""When the robot moved, when it was told to, and when it began to recover."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from slamreplay.bundle.odometry import odometry_track
+from slamreplay.bundle.track import PoseTrack
+from slamreplay.bundle.view import BundleView
+from slamreplay.geometry import se2
+from slamreplay.geometry.times import NS_PER_S
+
+#: Slower than this over a second is at rest: encoders are silent then, matched scans are not quite.
+REST_M_S, REST_RAD_S = 0.05, 0.06
+#: A rest this long is a stop; shorter ones are turns and doors.
+STOP_NS = 2 * NS_PER_S
+#: Commands below this are zeros of a controller that is idle.
+COMMAND_M_S, COMMAND_RAD_S = 0.02, 0.05
+#: Repeated rows of one recovery within this are one recovery.
+REPEAT_NS = 2 * NS_PER_S
+_FINISHED = ("success", "succeeded", "failure", "failed", "aborted", "canceled", "idle")
+
+
+@dataclass(frozen=True)
+class Rest:
+    """Times [start_ns, end_ns) at rest, after having moved."""
+
+    start_ns: int
+    end_ns: int
+
+
+@dataclass(frozen=True)
+class Recovery:
+    """The start of a recovery action."""
+
+    t_ns: int
+    name: str
+
+
+def moved_by(view: BundleView, otherwise: PoseTrack | None) -> PoseTrack | None:
+    """The track that tells motion: odometry, else another one."""
+    track = odometry_track(view)
+    return track if track is not None and len(track) > 1 else otherwise
+
+
+def rests(track: PoseTrack, min_ns: int = STOP_NS) -> tuple[Rest, ...]:
+    """Rests of at least `min_ns` that follow a motion."""
+    track = track.take(track.has_pose)
+    track = track.take(np.argsort(track.t_ns, kind="stable"))
+    if len(track) < 2:
+        return ()
+    half = NS_PER_S // 2
+    low, high = track.t_ns - half, track.t_ns + half
+    low, high = np.maximum(low, track.t_ns[0]), np.minimum(high, track.t_ns[-1])
+    step = se2.between(
+        se2.interpolate(track.t_ns, track.xyyaw, low),
+        se2.interpolate(track.t_ns, track.xyyaw, high),
+    )
+    span = np.maximum((high - low) / NS_PER_S, 1e-3)
+    speed = np.hypot(step[:, 0], step[:, 1]) / span
+    still = (speed < REST_M_S) & (np.abs(step[:, 2]) / span < REST_RAD_S)
+    found = []
+    for start, end in runs(still):
+        # The window smears the end of a motion by half its length.
+        begin = int(track.t_ns[start]) - (half // 2 if start else 0)
+        finish = int(track.t_ns[min(end, len(track) - 1)])
+        if start and finish - begin >= min_ns:
+            found.append(Rest(begin, finish))
+    return tuple(found)
+
+
+def commanded(view: BundleView) -> tuple[NDArray[np.int64], NDArray[np.bool_]] | None:
+    """Times (N,) of the commands, sorted, and whether each asked for motion; None without any."""
+    table = view.role("command")
+    if table is None or not len(table):
+        return None
+    table = table.sorted_by_time()
+    v = np.linalg.norm(np.nan_to_num(table["linear_velocity_xyz"]), axis=1)
+    w = np.abs(np.nan_to_num(table["angular_velocity_xyz"][:, 2]))
+    return table.t_ns, (v > COMMAND_M_S) | (w > COMMAND_RAD_S)
+
+
+def recoveries(view: BundleView) -> tuple[Recovery, ...]:
+    """Starts of recovery actions, in time order."""
+    table = view.table("recoveries")
+    if not len(table):
+        return ()
+    table = table.sorted_by_time()
+    status = np.char.lower(table["status"].astype(str))
+    begun = ~np.isin(status, _FINISHED)
+    table = table.take(begun) if begun.any() else table
+    found: list[Recovery] = []
+    last: dict[str, int] = {}
+    for t, name in zip(table.t_ns.tolist(), table["name"].astype(str).tolist(), strict=True):
+        if t - last.get(name, t - REPEAT_NS) >= REPEAT_NS:
+            found.append(Recovery(t, name))
+        last[name] = t
+    return tuple(found)
+
+
+def motion_starts(view: BundleView, otherwise: PoseTrack | None) -> tuple[int, ...]:
+    """Times at which a motion was begun after a second or more of none."""
+    told = commanded(view)
+    if told is not None:
+        t_ns, moving = told
+        begun = [int(t_ns[start]) for start, _ in runs(moving)]
+        ended = [int(t_ns[end - 1]) for _, end in runs(moving)]
+        gaps = [NS_PER_S, *(b - a for a, b in zip(ended, begun[1:], strict=False))]
+        return tuple(t for t, gap in zip(begun, gaps, strict=True) if gap >= NS_PER_S)
+    track = moved_by(view, otherwise)
+    if track is None or not len(track):
+        return ()
+    return tuple(r.end_ns for r in rests(track, NS_PER_S) if r.end_ns < int(track.t_ns.max()))
+
+
+def runs(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """Index ranges [start, end) over which a mask (N,) is true."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8)))
+    return [(int(start), int(end)) for start, end in edges.reshape(-1, 2)]

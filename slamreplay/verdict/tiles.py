@@ -1,0 +1,121 @@
+"""The tiles of the verdict: flags per scan, settled, numbered and given their findings."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from slamreplay.bundle.products import Changes, Hindsight
+from slamreplay.bundle.track import PoseTrack
+from slamreplay.bundle.view import BundleView
+from slamreplay.geometry import se2
+from slamreplay.geometry.times import ns
+from slamreplay.verdict.belief_error import BeliefError, belief_error
+from slamreplay.verdict.confidence import confidence, p_changed, p_off, trust
+from slamreplay.verdict.intervals import tiled
+from slamreplay.verdict.judgement import Interval
+from slamreplay.verdict.limits import Limits
+from slamreplay.verdict.map_frame import ConstantOffset, constant_offset
+from slamreplay.verdict.timeline import BAD, GOOD, UNKNOWN, held, settled
+
+
+@dataclass(frozen=True, eq=False)
+class Evidence:
+    """What the tiles are made of: belief against hindsight, and the offset taken out of it."""
+
+    error: BeliefError
+    changes: Changes | None
+    offset: ConstantOffset | None
+    trusted: float
+
+
+def gathered(
+    view: BundleView, belief: PoseTrack | None, hindsight: Hindsight, limits: Limits
+) -> Evidence:
+    """Belief against hindsight; where the map alone is off, in the map the robot had."""
+    error = belief_error(belief, hindsight, limits)
+    offset = constant_offset(view, error, limits)
+    if offset is not None and offset.cause == "map" and belief is not None:
+        # The robot was right in a map that lies elsewhere: judge it in that map.
+        back = se2.inverse(np.array(offset.xyyaw))
+        moved = PoseTrack(
+            belief.frame_id,
+            belief.child_frame_id,
+            belief.t_ns,
+            se2.compose(back, belief.xyyaw),
+            belief.cov,
+        )
+        error = belief_error(moved, hindsight, limits)
+    return Evidence(error, hindsight.changes, offset, trust(hindsight))
+
+
+def intervals_of(view: BundleView, evidence: Evidence, limits: Limits) -> tuple[Interval, ...]:
+    """The intervals that tile the log, with their numbers and the ids of their findings."""
+    span = (view.manifest.start_ns, max(view.manifest.end_ns, view.manifest.start_ns + 1))
+    error, changes, bridge = evidence.error, evidence.changes, ns(limits.bridge_s)
+    lost = held(error.t_ns, _lost_flags(error, limits), *span, bridge)
+    changed_t, flags = _changed_flags(error, changes, limits)
+    changed = held(changed_t, flags, *span, bridge)
+    tiles = tiled(
+        settled(lost, ns(limits.lost_s), bridge), settled(changed, ns(limits.changed_s), bridge)
+    )
+    return tuple(_numbered(tile, evidence, limits) for tile in tiles)
+
+
+def _lost_flags(error: BeliefError, limits: Limits) -> NDArray[np.int8]:
+    """Before the first belief lost is not judged: nothing is held against the robot then."""
+    known = error.known & np.isfinite(error.distance_m)
+    flags = np.where(error.off(limits), BAD, GOOD)
+    flags = np.where(known, flags, UNKNOWN)
+    return np.where(error.spoken | ~error.known, flags, GOOD).astype(np.int8)
+
+
+def _changed_flags(
+    error: BeliefError, changes: Changes | None, limits: Limits
+) -> tuple[NDArray[np.int64], NDArray[np.int8]]:
+    if changes is None or not len(changes.t_ns):
+        return error.t_ns, np.where(error.known, GOOD, UNKNOWN).astype(np.int8)
+    order = np.argsort(changes.t_ns, kind="stable")
+    t, share = changes.t_ns[order], changes.changed_share[order]
+    with np.errstate(invalid="ignore"):
+        flags = np.where(share > limits.changed_share, BAD, GOOD)
+    at = np.clip(np.searchsorted(error.t_ns, t), 0, len(error.t_ns) - 1)
+    known = np.isfinite(share) & ((error.t_ns[at] != t) | error.known[at])
+    return t, np.where(known, flags, UNKNOWN).astype(np.int8)
+
+
+def _numbered(tile: Interval, evidence: Evidence, limits: Limits) -> Interval:
+    error, changes = evidence.error, evidence.changes
+    inside = (error.t_ns >= tile.start_ns) & (error.t_ns < tile.end_ns) & error.known
+    metres, radians = error.distance_m[inside], error.heading_rad[inside]
+    metres, radians = metres[np.isfinite(metres)], radians[np.isfinite(radians)]
+    ids = {
+        "lost": ("SR-LOC-001",),
+        "map_changed": ("SR-MAP-001",),
+        "lost_and_map_changed": ("SR-LOC-001", "SR-MAP-001"),
+        "insufficient_data": ("SR-LOC-004",),
+    }.get(tile.state, ())
+    offset = evidence.offset
+    if offset is not None and (tile.is_lost or offset.cause == "map"):
+        ids = (*ids, *(("SR-MAP-FRAME",) if offset.cause != "lookalike" else ()))
+    sure = None
+    if tile.state != "insufficient_data":
+        p = p_off(error, limits)[inside]
+        p = np.where(np.isfinite(p), p, 0.5)  # before the first belief either may be true
+        p_state = p if tile.is_lost else 1.0 - p
+        if changes is not None and len(changes.t_ns):
+            rows = (changes.t_ns >= tile.start_ns) & (changes.t_ns < tile.end_ns)
+            q = p_changed(changes.changed_share[rows], limits)
+            q = q[np.isfinite(q)]
+            share = float(q.mean()) if len(q) else 0.5
+            p_state = p_state * (share if tile.is_changed else 1.0 - share)
+        sure = confidence(p_state, evidence.trusted)
+    return replace(
+        tile,
+        confidence=sure,
+        max_error_m=float(metres.max()) if len(metres) else None,
+        max_error_rad=float(radians.max()) if len(radians) else None,
+        findings=ids,
+    )
