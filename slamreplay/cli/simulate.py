@@ -61,6 +61,9 @@ def _simulate(
         if scenario is None:
             write_samples(output, progress=progress)
         else:
+            from slamreplay.simulate.scenarios import scenario as scenario_of
+
+            seed = scenario_of(scenario).seed if seed is None else seed
             simulate(scenario, output, seed=seed)
     if as_json:
         typer.echo(json.dumps({"scenario": scenario, "seed": seed, "log": str(output)}))

@@ -84,11 +84,10 @@ def _store(ros_version: int) -> Any:
 @contextmanager
 def _scratch(target: Path) -> Iterator[Path]:
     """A folder on the target's file system; what is made in it has names that go into files."""
-    try:
-        with TemporaryDirectory(prefix=f".{target.name}.", dir=target.parent) as folder:
-            yield Path(folder)
-    except FileNotFoundError as error:
-        raise OutputError("there is no such folder", where=target.parent) from error
+    if not target.parent.is_dir():
+        raise OutputError("there is no such folder", where=target.parent)
+    with TemporaryDirectory(prefix=f".{target.name}.", dir=target.parent) as folder:
+        yield Path(folder)
 
 
 def _write_mcap(path: Path, store: Any, log: Sequence[Record]) -> Path:
