@@ -17,6 +17,7 @@ from slamreplay.report.figures.course import course_figure
 from slamreplay.report.figures.covariance import covariance_figure
 from slamreplay.report.figures.map import map_figure
 from slamreplay.report.page import Page, page
+from slamreplay.report.phrases import bound
 
 
 @dataclass(frozen=True)
@@ -42,6 +43,7 @@ def html(post: Postmortem) -> str:
     environment = Environment(
         autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
+    environment.filters["bound"] = bound
     return environment.from_string(source).render(
         page=view, policy=policy, style=style, **_pictures(post, view)
     )

@@ -35,7 +35,7 @@ def _whole(value: Any) -> int | None:
 Number = Annotated[float | None, BeforeValidator(_finite)]
 Count = Annotated[int | None, BeforeValidator(_whole)]
 Ns = Annotated[int, BeforeValidator(_whole)]
-Share = Annotated[float | None, BeforeValidator(_finite), Field(ge=0.0, le=1.0)]
+Share = Annotated[Annotated[float, Field(ge=0.0, le=1.0)] | None, BeforeValidator(_finite)]
 Bbox = tuple[float, float, float, float]
 
 

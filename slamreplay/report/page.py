@@ -13,7 +13,7 @@ from slamreplay.report import phrases, tables
 from slamreplay.report.assess import not_assessable, title_of
 from slamreplay.report.evidence import Postmortem
 from slamreplay.report.facts import Fact, deciding_facts
-from slamreplay.report.phrases import number, percent, seconds, span
+from slamreplay.report.phrases import percent, seconds, short, span
 from slamreplay.report.tables import Table, table
 from slamreplay.report.words import FAILURE_MODES, STATES, StateWords
 
@@ -210,9 +210,9 @@ def _judged(
 ) -> str:
     parts = []
     if value is not None:
-        parts.append(f"value {value:.3g} {unit}".strip())
+        parts.append(f"value {short(value)} {'' if unit == '1' else unit}".rstrip())
     if low is not None or high is not None:
-        parts.append(f"expected {number(low, '.3g')} to {number(high, '.3g')}")
+        parts.append(f"expected {short(low)} to {short(high)}")
     if n is not None:
         effective = "" if n_eff is None else f", worth {n_eff:.0f} independent ones"
         parts.append(f"{n} samples{effective}")

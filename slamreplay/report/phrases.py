@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 
 from slamreplay.geometry.times import NS_PER_S
@@ -10,6 +12,14 @@ from slamreplay.report.words import STATES
 
 #: What stands in a cell for a number that is not known.
 NOT_KNOWN = "-"
+
+
+_QUANTITY = re.compile(r"(?<=\d) (?=(?:s|m|m²|cm|deg|rad|%|min|h)(?!\w))")
+
+
+def bound(text: str) -> str:
+    """The text with numbers tied to their units, so that no line breaks between them."""
+    return _QUANTITY.sub("\N{NO-BREAK SPACE}", text)
 
 
 def percent(share: float | None) -> str:
@@ -28,6 +38,11 @@ def number(value: float | None, form: str = ".2f", unit: str = "") -> str:
     if value is None or not np.isfinite(value):
         return NOT_KNOWN
     return f"{value:{form}}{' ' if unit else ''}{unit}"
+
+
+def short(value: float | None) -> str:
+    """Three digits, and no power of ten where plain digits are shorter."""
+    return number(value, ".0f" if value is not None and abs(value) >= 1000.0 else ".3g")
 
 
 def span(post: Postmortem, start_ns: int | None, end_ns: int | None) -> str:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from slamreplay.report.evidence import Postmortem
-from slamreplay.report.phrases import NOT_KNOWN, number, percent, seconds, span
+from slamreplay.report.phrases import NOT_KNOWN, number, percent, seconds, short, span
 from slamreplay.report.words import STATES
 
 #: Rows of one table on the page; report.json has them all.
@@ -157,15 +157,11 @@ def trials(post: Postmortem) -> Table:
         ]
         for name in names:
             beside = base.get(name) if name != "baseline_max_m" else None
-            aside = "" if beside is None else f"baseline {_short(beside)}"
-            cells.append(Cell(_short(result.metrics.get(name)), aside))
+            aside = "" if beside is None else f"baseline {short(beside)}"
+            cells.append(Cell(short(result.metrics.get(name)), aside))
         if result.run.estimate is None:
             cells[3:] = [Cell("not applicable", result.run.not_applicable or "")]
             cells += [""] * (len(names) - 1)
         rows.append(cells)
     head = ("estimator", "perturbation", "level", *(_COLUMNS[n] for n in names))
     return table(head, rows)
-
-
-def _short(value: float | None) -> str:
-    return number(value, ".0f" if value is not None and abs(value) >= 1000.0 else ".3g")

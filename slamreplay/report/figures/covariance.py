@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Ellipse, Patch
@@ -16,7 +17,7 @@ from slamreplay.report.figures import canvas
 from slamreplay.report.figures.canvas import BLUE, FAINT, INK, ORANGE, SKY, VERMILLION
 
 _SIGMAS = 3.0
-_ELLIPSES = 40
+_ELLIPSES = 24
 
 
 def claimed(belief: PoseTrack | None) -> NDArray[np.bool_]:
@@ -65,7 +66,7 @@ def covariance_figure(post: Postmortem, width_in: float) -> Figure | None:
     time[-1].set_xlim(0.0, max(end_s, 1e-3))
     handles = [
         Patch(
-            facecolor=ORANGE, alpha=0.35, edgecolor=ORANGE, label="3-sigma ellipse of the belief"
+            facecolor=to_rgba(ORANGE, 0.08), edgecolor=ORANGE, label="3-sigma ellipse of the belief"
         ),
         *handles,
     ]
@@ -96,10 +97,9 @@ def _draw_ellipses(
             2.0 * _SIGMAS * np.sqrt(values[1]),
             2.0 * _SIGMAS * np.sqrt(values[0]),
             angle=float(angle),
-            facecolor=ORANGE,
-            edgecolor=ORANGE,
+            facecolor=to_rgba(ORANGE, 0.08),
+            edgecolor=to_rgba(ORANGE, 0.9),
             linewidth=0.9,
-            alpha=0.35,
             zorder=4,
         )
         axes.add_patch(ellipse)

@@ -34,7 +34,7 @@ def map_figure(post: Postmortem, width_in: float) -> Figure | None:
     low, high = _window(post, paths)
     size = canvas.text_size(width_in)
     aspect = (high[1] - low[1]) / (high[0] - low[0])
-    figure = canvas.new_figure(width_in, float(np.clip(width_in * aspect, 2.0, 6.6)) + 1.1)
+    figure = canvas.new_figure(width_in, width_in)
     axes = figure.add_subplot()
     handles: list[object] = []
     if post.grid is not None and alone is None:
@@ -49,7 +49,12 @@ def map_figure(post: Postmortem, width_in: float) -> Figure | None:
     handles += _draw_parting(axes, post, size)
     handles += _draw_stops(axes, post, size)
     _draw_regions(axes, post, size)
-    canvas.legend(figure, handles, size, columns=2 if width_in < 5.0 else 4)
+    columns = 2 if width_in < 5.0 else 4
+    canvas.legend(figure, handles, size, columns)
+    # Equal axes leave the rest of their box empty: the paper is cut to what they need.
+    around = 0.7 + 0.022 * size * -(-len(handles) // columns)
+    plane = float(np.clip((width_in - 0.75) * aspect, 1.8, 6.6))
+    figure.set_size_inches(width_in, plane + around)
     return figure
 
 
