@@ -26,8 +26,8 @@ class BeliefError:
         where: (N, 3) as hindsight has it, NaN where it does not know.
         distance_m: (N,) between the two, NaN where either is missing.
         heading_rad: (N,) absolute difference in heading.
-        sigma_m: (N,) standard deviation of the difference along its direction, both covariances
-            counted.
+        sigma_m: (N,) hindsight's standard deviation along the difference. The belief's own is not
+            in it: what the robot believed is known exactly, however unsure it was.
         sigma_rad: (N,) of the heading.
         known: (N,) moments at which hindsight can be trusted.
         spoken: (N,) moments from the first belief on.
@@ -65,7 +65,7 @@ def belief_error(belief: PoseTrack | None, hindsight: Hindsight, limits: Limits)
     there = belief.at(track.t_ns)
     step = there.xyyaw - track.xyyaw
     distance = np.hypot(step[:, 0], step[:, 1])
-    sigma_m, sigma_rad = _sigma(step, track.cov, there.cov)
+    sigma_m, sigma_rad = _sigma(step, track.cov)
     return BeliefError(
         track.t_ns,
         there.xyyaw,
@@ -122,12 +122,13 @@ def _from_first(belief: PoseTrack, t_ns: NDArray[np.int64]) -> NDArray[np.bool_]
     return t_ns >= times.min() if len(times) else np.zeros(len(t_ns), dtype=bool)
 
 
-def _sigma(step: se2.Array, *covs: se2.Array) -> tuple[se2.Array, se2.Array]:
-    """Along the difference (N, 3) in the plane, and in heading; unknown covariances add nothing."""
+def _sigma(step: se2.Array, cov: se2.Array) -> tuple[se2.Array, se2.Array]:
+    """Along the difference (N, 3) in the plane, and in heading; an unknown one is the floor."""
     length = np.maximum(np.hypot(step[:, 0], step[:, 1]), 1e-9)
     u = step[:, :2] / length[:, None]
-    along = [np.einsum("ni,nij,nj->n", u, cov[:, :2, :2], u) for cov in covs]
-    turn = [cov[:, 2, 2] for cov in covs]
-    sum_m = np.sum([np.where(a > 0.0, a, 0.0) for a in np.nan_to_num(along)], axis=0)
-    sum_rad = np.sum([np.where(a > 0.0, a, 0.0) for a in np.nan_to_num(turn)], axis=0)
-    return np.sqrt(sum_m + FLOOR_M**2), np.sqrt(sum_rad + FLOOR_RAD**2)
+    along = np.nan_to_num(np.einsum("ni,nij,nj->n", u, cov[:, :2, :2], u))
+    turn = np.nan_to_num(cov[:, 2, 2])
+    return (
+        np.sqrt(np.maximum(along, 0.0) + FLOOR_M**2),
+        np.sqrt(np.maximum(turn, 0.0) + FLOOR_RAD**2),
+    )

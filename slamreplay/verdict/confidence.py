@@ -1,12 +1,13 @@
 """How sure a state is: a documented, monotone mapping. NOT CALIBRATED YET.
 
-Per scan, the probability that the belief is beyond its limit is Phi((error - limit) / sigma), with
-the covariances of belief and hindsight in sigma, and that the map is contradicted is
-Phi((share - limit) / 0.03). An interval's number is the mean over its scans that the state is the
-right one. It is drawn towards one half by how far hindsight can be trusted (its coverage, and how
-well the map explains a typical scan), and kept within 1 and 99 %. Errors of neighbouring scans are
-not independent and hindsight's own mistakes are not Gaussian: read it as an order, not as a
-frequency, until the benchmark's reliability diagram says otherwise.
+Per scan, the probability that the belief is beyond its limit is Phi((error - limit) / sigma) with
+hindsight's sigma, and that the map is contradicted is Phi((share - limit) / 0.03). The belief's own
+covariance says how unsure the robot was, not how unsure we are of what it believed: it counts in
+NEES and in the action gate, not here. An interval's number is the mean over its scans that the
+state is the right one. It is drawn towards one half by how far hindsight can be trusted (its
+coverage, and how well the map explains a typical scan), and kept within 1 and 99 %. Errors of
+neighbouring scans are not independent and hindsight's own mistakes are not Gaussian: read it as an
+order, not as a frequency, until the benchmark's reliability diagram says otherwise.
 """
 
 from __future__ import annotations

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -34,14 +35,35 @@ def verdict_findings(
     if view.grid is None:
         text = "no map in the log and none given: nothing can be judged against it"
         found.append(Finding("SR-MAP-002", "warning", text, *span))
-    found += [_lost(i, view, limits) for i in intervals if i.is_lost]
-    found += [_changed(i, hindsight, limits) for i in intervals if i.is_changed]
+    found += [_lost(e, view, limits) for e in _episodes(intervals, lambda i: i.is_lost)]
+    found += [_changed(e, hindsight, limits) for e in _episodes(intervals, lambda i: i.is_changed)]
     if hindsight is not None:
         found += _unobservable(intervals, hindsight, limits)
         found += _wrong_map(intervals, hindsight, limits)
     found += _offset(offset, span)
     found += _unjudged(intervals, span)
     return tuple(sorted(found, key=lambda f: (-SEVERITIES.index(f.severity), f.start_ns or 0)))
+
+
+def _episodes(intervals: Sequence[Interval], wanted: Callable[[Interval], bool]) -> list[Interval]:
+    """Neighbouring intervals that answer one question with yes, made one."""
+    found: list[Interval] = []
+    for i in intervals:
+        if not wanted(i):
+            continue
+        last = found[-1] if found else None
+        if last is None or last.end_ns != i.start_ns:
+            found.append(i)
+            continue
+        metres = [v for v in (last.max_error_m, i.max_error_m) if v is not None]
+        radians = [v for v in (last.max_error_rad, i.max_error_rad) if v is not None]
+        found[-1] = replace(
+            last,
+            end_ns=i.end_ns,
+            max_error_m=max(metres, default=None),
+            max_error_rad=max(radians, default=None),
+        )
+    return found
 
 
 def _lost(i: Interval, view: BundleView, limits: Limits) -> Finding:

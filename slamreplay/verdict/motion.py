@@ -21,12 +21,16 @@ STOP_NS = 2 * NS_PER_S
 COMMAND_M_S, COMMAND_RAD_S = 0.02, 0.05
 #: Repeated rows of one recovery within this are one recovery.
 REPEAT_NS = 2 * NS_PER_S
+#: Nav2's default trees: the node that runs as long as a goal is active, and the nodes that only
+#: choose among recoveries.
+NAVIGATION = ("NavigateRecovery",)
+WRAPPERS = ("RecoveryFallback", "RecoveryActions", "ClearingActions")
 _FINISHED = ("success", "succeeded", "failure", "failed", "aborted", "canceled", "idle")
 
 
 @dataclass(frozen=True)
-class Rest:
-    """Times [start_ns, end_ns) at rest, after having moved."""
+class Span:
+    """Times [start_ns, end_ns): at rest after having moved, or with an active goal."""
 
     start_ns: int
     end_ns: int
@@ -46,8 +50,17 @@ def moved_by(view: BundleView, otherwise: PoseTrack | None) -> PoseTrack | None:
     return track if track is not None and len(track) > 1 else otherwise
 
 
-def rests(track: PoseTrack, min_ns: int = STOP_NS) -> tuple[Rest, ...]:
-    """Rests of at least `min_ns` that follow a motion."""
+def rests(
+    track: PoseTrack, min_ns: int = STOP_NS, *, turning_counts: bool = True
+) -> tuple[Span, ...]:
+    """Rests of at least `min_ns` that follow a motion.
+
+    Args:
+        track: what tells motion.
+        min_ns: shorter rests are left out.
+        turning_counts: whether turning on the spot is motion; a robot that spins to recover has
+            stopped all the same.
+    """
     track = track.take(track.has_pose)
     track = track.take(np.argsort(track.t_ns, kind="stable"))
     if len(track) < 2:
@@ -55,20 +68,19 @@ def rests(track: PoseTrack, min_ns: int = STOP_NS) -> tuple[Rest, ...]:
     half = NS_PER_S // 2
     low, high = track.t_ns - half, track.t_ns + half
     low, high = np.maximum(low, track.t_ns[0]), np.minimum(high, track.t_ns[-1])
-    step = se2.between(
-        se2.interpolate(track.t_ns, track.xyyaw, low),
-        se2.interpolate(track.t_ns, track.xyyaw, high),
-    )
+    before = se2.interpolate(track.t_ns, track.xyyaw, low)
+    step = se2.between(before, se2.interpolate(track.t_ns, track.xyyaw, high))
     span = np.maximum((high - low) / NS_PER_S, 1e-3)
-    speed = np.hypot(step[:, 0], step[:, 1]) / span
-    still = (speed < REST_M_S) & (np.abs(step[:, 2]) / span < REST_RAD_S)
+    still = np.hypot(step[:, 0], step[:, 1]) / span < REST_M_S
+    if turning_counts:
+        still &= np.abs(step[:, 2]) / span < REST_RAD_S
     found = []
     for start, end in runs(still):
-        # The window smears the end of a motion by half its length.
-        begin = int(track.t_ns[start]) - (half // 2 if start else 0)
+        # The window smears a motion by half its length: it ended about that much earlier.
+        begin = max(int(track.t_ns[start]) - half, int(track.t_ns[0])) if start else 0
         finish = int(track.t_ns[min(end, len(track) - 1)])
         if start and finish - begin >= min_ns:
-            found.append(Rest(begin, finish))
+            found.append(Span(begin, finish))
     return tuple(found)
 
 
@@ -84,11 +96,17 @@ def commanded(view: BundleView) -> tuple[NDArray[np.int64], NDArray[np.bool_]] |
 
 
 def recoveries(view: BundleView) -> tuple[Recovery, ...]:
-    """Starts of recovery actions, in time order."""
+    """Starts of recovery actions, in time order; the tree nodes around them are left out."""
     table = view.table("recoveries")
     if not len(table):
         return ()
     table = table.sorted_by_time()
+    names = table["name"].astype(str)
+    table = table.take(~np.isin(names, NAVIGATION))
+    actions = ~np.isin(table["name"].astype(str), WRAPPERS)
+    table = table.take(actions) if actions.any() else table
+    if not len(table):
+        return ()
     status = np.char.lower(table["status"].astype(str))
     begun = ~np.isin(status, _FINISHED)
     table = table.take(begun) if begun.any() else table
@@ -98,6 +116,28 @@ def recoveries(view: BundleView) -> tuple[Recovery, ...]:
         if t - last.get(name, t - REPEAT_NS) >= REPEAT_NS:
             found.append(Recovery(t, name))
         last[name] = t
+    return tuple(found)
+
+
+def navigations(view: BundleView) -> tuple[Span, ...] | None:
+    """Times [start, end) with an active goal, as the behaviour tree tells; None where it does not.
+
+    A navigation that the log does not see the end of lasts to the log's end.
+    """
+    table = view.table("recoveries").sorted_by_time()
+    table = table.take(np.isin(table["name"].astype(str), NAVIGATION))
+    if not len(table):
+        return None
+    found, begun = [], None
+    for t, status in zip(table.t_ns.tolist(), table["status"].astype(str).tolist(), strict=True):
+        if status.lower() in _FINISHED:
+            if begun is not None:
+                found.append(Span(begun, t))
+            begun = None
+        elif begun is None:
+            begun = t
+    if begun is not None:
+        found.append(Span(begun, max(view.manifest.end_ns, begun)))
     return tuple(found)
 
 

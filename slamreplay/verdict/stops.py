@@ -13,7 +13,15 @@ from slamreplay.geometry import se2, se3
 from slamreplay.geometry.times import NS_PER_S
 from slamreplay.geometry.transforms import clean_frame
 from slamreplay.verdict.judgement import Interval, State, Stop
-from slamreplay.verdict.motion import Recovery, Rest, commanded, moved_by, recoveries, rests
+from slamreplay.verdict.motion import (
+    STOP_NS,
+    Span,
+    commanded,
+    moved_by,
+    navigations,
+    recoveries,
+    rests,
+)
 
 #: A recovery this soon after the robot came to rest, or this shortly before, belongs to the stop.
 RECOVERY_AFTER_NS, RECOVERY_BEFORE_NS = 10 * NS_PER_S, 3 * NS_PER_S
@@ -42,13 +50,9 @@ def stops(
     track = moved_by(view, where if where is not None else belief)
     if track is None:
         return ()
-    begun = recoveries(view)
     found: list[Stop] = []
     last: se2.Array | None = None
-    for rest in rests(track):
-        reason = _reason(view, rest, belief, track, begun)
-        if reason is None:
-            continue
+    for rest, reason in _unplanned(view, belief, track):
         here = se2.interpolate(track.t_ns, track.xyyaw, np.array([rest.start_ns]))[0]
         if last is not None and np.hypot(*(here - last)[:2]) < SAME_PLACE_M:
             continue
@@ -56,7 +60,8 @@ def stops(
         interval = _at(intervals, rest.start_ns)
         state: State = "insufficient_data" if interval is None else interval.state
         x, y = _place((where, belief), rest.start_ns)
-        found.append(Stop(rest.start_ns, x, y, state, _cause(interval, rest, view, reason)))
+        cause = _cause(intervals, interval, rest, view.manifest.start_ns, reason)
+        found.append(Stop(rest.start_ns, x, y, state, cause))
     return tuple(found)
 
 
@@ -74,24 +79,47 @@ def stop_findings(found: Sequence[Stop], start_ns: int) -> tuple[Finding, ...]:
     )
 
 
+def _unplanned(
+    view: BundleView, belief: PoseTrack | None, track: PoseTrack
+) -> list[tuple[Span, str]]:
+    """Spans before arrival with the reason to think so, in time order."""
+    found: dict[int, tuple[Span, str]] = {}
+    begun = recoveries(view)
+    for rest in rests(track, turning_counts=False):
+        until = min(rest.end_ns, rest.start_ns + RECOVERY_AFTER_NS)
+        for recovery in begun:
+            if rest.start_ns - RECOVERY_BEFORE_NS <= recovery.t_ns <= until:
+                found[rest.start_ns] = rest, f"the recovery '{recovery.name}' followed"
+                break
+    active = navigations(view)
+    for rest in rests(track):
+        if any(other.start_ns <= rest.start_ns < other.end_ns for other, _ in found.values()):
+            continue
+        reason = _reason(view, rest, belief, track, active)
+        if reason is not None:
+            found[rest.start_ns] = rest, reason
+    return [found[t] for t in sorted(found)]
+
+
 def _reason(
     view: BundleView,
-    rest: Rest,
+    rest: Span,
     belief: PoseTrack | None,
     track: PoseTrack,
-    begun: Sequence[Recovery],
+    active: Sequence[Span] | None,
 ) -> str | None:
     """Why a rest is no arrival; None where it may be one."""
-    until = max(rest.end_ns, rest.start_ns + RECOVERY_AFTER_NS)
-    for recovery in begun:
-        if rest.start_ns - RECOVERY_BEFORE_NS <= recovery.t_ns <= until:
-            return f"the recovery '{recovery.name}' followed"
     told = commanded(view)
     if told is not None:
         t_ns, moving = told
         inside = (t_ns >= rest.start_ns + NS_PER_S // 2) & (t_ns < rest.end_ns)
         if inside.any() and moving[inside].mean() >= UNHEEDED:
             return "it was told to move on and did not: blocked, or its drive was off"
+    if active is not None:
+        goal = any(
+            a.start_ns < rest.start_ns and rest.start_ns + STOP_NS < a.end_ns for a in active
+        )
+        return "its goal was still active" if goal else None
     short = _short_of_goal_m(view, rest, belief, track)
     if short is not None and short > ARRIVED_M:
         return f"it was still {short:.1f} m short of the end of its plan"
@@ -99,7 +127,7 @@ def _reason(
 
 
 def _short_of_goal_m(
-    view: BundleView, rest: Rest, belief: PoseTrack | None, track: PoseTrack
+    view: BundleView, rest: Span, belief: PoseTrack | None, track: PoseTrack
 ) -> float | None:
     plans = view.role("plan")
     if plans is None or not len(plans):
@@ -138,17 +166,26 @@ def _place(tracks: Sequence[PoseTrack | None], t_ns: int) -> tuple[float | None,
     return None, None
 
 
-def _cause(interval: Interval | None, rest: Rest, view: BundleView, reason: str) -> str:
-    """What came first: the state the robot was in, else what the log says of the stop itself."""
+def _cause(
+    intervals: Sequence[Interval], interval: Interval | None, rest: Span, start_ns: int, reason: str
+) -> str:
+    """What came first: being lost or the changed map, else what the log says of the stop itself."""
     if interval is None or not (interval.is_lost or interval.is_changed):
         return reason
-    before = (rest.start_ns - interval.start_ns) / NS_PER_S
-    since = (interval.start_ns - view.manifest.start_ns) / NS_PER_S
-    when = f"since {since:.1f} s, {before:.1f} s before it stopped"
-    if interval.state == "lost":
-        return f"it was lost {when}; {reason}"
-    if interval.state == "map_changed":
-        return (
-            f"it was where it believed to be, but what it saw contradicted the map {when}; {reason}"
-        )
-    return f"it was lost where the map was not true either, {when}; {reason}"
+    parts = []
+    if interval.is_lost:
+        parts.append((since(intervals, interval, lost=True), "it was lost"))
+    if interval.is_changed:
+        parts.append((since(intervals, interval, lost=False), "what it saw contradicted the map"))
+    words = [f"{text} since {(t - start_ns) / NS_PER_S:.1f} s" for t, text in sorted(parts)]
+    return f"{' and '.join(words)}; {reason}"
+
+
+def since(intervals: Sequence[Interval], interval: Interval, *, lost: bool) -> int:
+    """When the unbroken stretch of one answer began that an interval is part of, ns."""
+    begun = interval.start_ns
+    for other in reversed([i for i in intervals if i.end_ns <= interval.start_ns]):
+        if other.end_ns != begun or not (other.is_lost if lost else other.is_changed):
+            break
+        begun = other.start_ns
+    return begun

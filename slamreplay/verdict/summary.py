@@ -90,7 +90,7 @@ def _what(
     if state == "lost_and_map_changed":
         return (
             f"The robot was lost and the aisle had changed: "
-            f"{_lost(intervals, mode, offset, start_ns)}; {_changed(intervals, changes, start_ns)}"
+            f"{_lost(intervals, mode, offset, start_ns)}; {_share(intervals, changes, start_ns)}"
         )
     if not has_belief:
         return (
@@ -113,11 +113,8 @@ def _lost(
     begin, end = ((t - start_ns) / NS_PER_S for t in (lost[0].start_ns, lost[-1].end_ns))
     far = f"{metres:.1f} m" if metres >= 0.5 else f"{np.degrees(radians):.0f} degrees"
     text = f"from {begin:.1f} s to {end:.1f} s its belief was up to {far} off"
-    if len(lost) > 1:
-        text = (
-            f"between {begin:.1f} s and {end:.1f} s its belief was off for {total:.1f} s in all, "
-        )
-        text += f"by up to {far}"
+    if end - begin > total + 0.1:
+        text += f", for {total:.1f} s in all"
     if mode.kind in _BECAUSE:
         text += f"; {_BECAUSE[mode.kind]}"
     if offset is not None and offset.cause == "map_or_start":
@@ -126,6 +123,10 @@ def _lost(
 
 
 def _changed(intervals: Sequence[Interval], changes: Changes | None, start_ns: int) -> str:
+    return f"the aisle had changed: {_share(intervals, changes, start_ns)}"
+
+
+def _share(intervals: Sequence[Interval], changes: Changes | None, start_ns: int) -> str:
     changed = [i for i in intervals if i.is_changed]
     if not changed or changes is None:
         return "the world differed from the map"
@@ -133,8 +134,7 @@ def _changed(intervals: Sequence[Interval], changes: Changes | None, start_ns: i
     share = changes.changed_share[np.isfinite(changes.changed_share)]
     most = 100.0 * float(share.max()) if len(share) else 0.0
     text = (
-        f"the aisle had changed: between {begin:.1f} s and {end:.1f} s up to {most:.0f} % of what "
-        "it saw contradicts the map"
+        f"from {begin:.1f} s to {end:.1f} s up to {most:.0f} % of what it saw contradicts the map"
     )
     if changes.regions:
         region = max(changes.regions, key=lambda r: r.area_m2)

@@ -69,7 +69,11 @@ def _lost_flags(error: BeliefError, limits: Limits) -> NDArray[np.int8]:
     known = error.known & np.isfinite(error.distance_m)
     flags = np.where(error.off(limits), BAD, GOOD)
     flags = np.where(known, flags, UNKNOWN)
-    return np.where(error.spoken | ~error.known, flags, GOOD).astype(np.int8)
+    flags = np.where(error.spoken | ~error.known, flags, GOOD)
+    first = int(np.argmax(error.spoken)) if error.spoken.any() else 0
+    if first and error.t_ns[first] - error.t_ns[0] < ns(limits.bridge_s):
+        flags[:first] = flags[first]  # the log began a moment before the localizer spoke
+    return flags.astype(np.int8)
 
 
 def _changed_flags(
