@@ -20,6 +20,7 @@ def smooth_chain(
     motions: se2.Array,
     motion_cov: se2.Array,
     is_open: NDArray[np.bool_],
+    is_solid: NDArray[np.bool_],
     anchor_index: NDArray[np.int64],
     anchors: se2.Array,
     anchor_cov: se2.Array,
@@ -31,6 +32,7 @@ def smooth_chain(
         motions: (K - 1, 3) measured motion from each pose to the next.
         motion_cov: (K - 1, 3, 3) its covariance in axes of the earlier pose.
         is_open: (K - 1,) motions that are not known and make no constraint.
+        is_solid: (K - 1,) motions that are beyond doubt; the others may be given up (Cauchy).
         anchor_index: (A,) which pose an anchor is for.
         anchors: (A, 3) poses measured against the map.
         anchor_cov: (A, 3, 3) their covariances about the map's axes.
@@ -46,7 +48,8 @@ def smooth_chain(
     for k in np.flatnonzero(~is_open).tolist():
         noise = gtsam.noiseModel.Gaussian.Covariance(turned[k])
         motion = gtsam.Pose2(*motions[k].tolist())
-        graph.add(gtsam.BetweenFactorPose2(k, k + 1, motion, _robust(noise)))
+        trusted = noise if is_solid[k] else _robust(noise)
+        graph.add(gtsam.BetweenFactorPose2(k, k + 1, motion, trusted))
     body_cov = gtsam_from_planar(anchor_cov, anchors[:, 2])
     for k, pose, cov in zip(anchor_index.tolist(), anchors.tolist(), body_cov, strict=True):
         noise = gtsam.noiseModel.Gaussian.Covariance(cov)

@@ -8,11 +8,16 @@ from numpy.typing import NDArray
 
 from slamreplay.geometry import se2
 from slamreplay.hindsight.beams import HIT, Beams
+from slamreplay.hindsight.keyframes import MIN_POINTS
+from slamreplay.hindsight.smoothing import MIN_SCORE, match_covariance
+from slamreplay.matching.correlative import Window, match
 from slamreplay.matching.field import ScoreField
+from slamreplay.matching.thinning import thin
+
+WINDOW = Window(0.1, 0.05, 0.09, 0.015, pull=0.05)
 
 
 def carry(
-    t_ns: NDArray[np.int64],
     odometry: se2.Array,
     keys: NDArray[np.int64],
     poses: se2.Array,
@@ -26,7 +31,6 @@ def carry(
     the time. Over an open link (kidnapped, chain broken) each scan goes to the side it fits.
 
     Args:
-        t_ns: (N,) scan times.
         odometry: (N, 3) odometry at the scans.
         keys: (K,) indices of the keyframes among the scans, ascending, K >= 1.
         poses: (K, 3) their poses.
@@ -34,6 +38,7 @@ def carry(
         beams: the scans.
         field: score field of the map, to choose sides.
     """
+    t_ns = beams.t_ns
     scan = np.arange(len(t_ns))
     before = np.clip(np.searchsorted(keys, scan, side="right") - 1, 0, len(keys) - 1)
     after = np.minimum(before + 1, len(keys) - 1)
@@ -54,6 +59,49 @@ def carry(
         share[over] = np.where(later, after, before)[over]
     carried[keys], share[keys] = poses, np.arange(len(keys))
     return carried, share
+
+
+def settle(
+    carried: se2.Array,
+    cov: se2.Array,
+    odometry: se2.Array,
+    near: NDArray[np.int64],
+    beams: Beams,
+    field: ScoreField,
+) -> tuple[se2.Array, se2.Array]:
+    """Poses (N, 3) and covariances (N, 3, 3) after each scan was weighed against the map itself.
+
+    Odometry is stamped late, or slips, between keyframes; the scan's own match corrects the pose as
+    far as odometry may be wrong over the way from its keyframe.
+
+    Args:
+        carried: (N, 3) poses as odometry carries them; NaN rows stay.
+        cov: (N, 3, 3) covariances of the keyframes they were carried from.
+        odometry: (N, 3) odometry at the scans.
+        near: (N,) the scan that is the keyframe of each.
+        beams: the scans.
+        field: score field of the map.
+    """
+    way = se2.between(odometry[near], odometry)
+    sigma_m = 0.02 + 0.1 * np.hypot(way[:, 0], way[:, 1]) + 0.03 * np.abs(way[:, 2])
+    sigma = np.stack([sigma_m, sigma_m, 0.005 + 0.4 * np.abs(way[:, 2])], axis=1)
+    poses, spread = carried.copy(), cov.copy()
+    moved = np.flatnonzero(np.isfinite(carried).all(axis=1) & (near != np.arange(len(near))))
+    for k in moved.tolist():
+        prior = cov[k] + np.diag(sigma[k] ** 2)
+        spread[k] = prior
+        points = thin(beams.points(k), 0.1)
+        if len(points) < MIN_POINTS:
+            continue
+        top = match(field, points, carried[k], WINDOW)
+        off = top.xyyaw - carried[k]
+        if top.score < MIN_SCORE or np.hypot(off[0], off[1]) > 0.3 or abs(off[2]) > 0.15:
+            continue
+        measured = match_covariance(top.information[None], np.array([top.score]))[0]
+        gain = prior @ np.linalg.inv(prior + measured)
+        poses[k] = carried[k] + gain @ off
+        spread[k] = prior - gain @ prior
+    return poses, 0.5 * (spread + np.swapaxes(spread, 1, 2))
 
 
 def scan_scores(field: ScoreField, beams: Beams, poses: se2.Array) -> se2.Array:

@@ -20,6 +20,8 @@ MEMORY, RADIUS_M = 12, 15.0
 GOOD, POOR = 0.6, 0.35
 #: A wider search must beat the narrow one by this much: the odometry is a witness as well.
 GAIN = 0.08
+#: Within this scan and odometry agree on the motion between two keyframes.
+AGREE_M, AGREE_RAD = 0.15, 0.2
 NARROW = Window(0.3, 0.05, np.radians(12.0), np.radians(1.5), pull=0.03)
 WIDE = Window(1.2, 0.1, np.radians(20.0), np.radians(2.0), pull=0.03)
 AROUND = Window(0.6, 0.1, np.pi, np.radians(3.0), pull=0.03)
@@ -33,12 +35,14 @@ class Chain:
         xyyaw: (K, 3) poses.
         score: (K,) how well each fits the ones before it; 1 for the first.
         is_break: (K,) nothing before it was found in its scan: the motion to it is not known.
+        is_solid: (K,) scan and odometry agree well on the motion to it.
         information: (K, 3, 3) of each pose against the local map, chain axes.
     """
 
     xyyaw: se2.Array
     score: se2.Array
     is_break: NDArray[np.bool_]
+    is_solid: NDArray[np.bool_]
     information: se2.Array
 
 
@@ -63,17 +67,23 @@ def scan_matched(points: Sequence[se2.Array], odometry: se2.Array | None) -> Cha
             else:
                 motion = se2.between(xyyaw[k - 2], last) if k > 1 else np.zeros(3)
                 guess = se2.compose(last, motion)
-            found = _lay(memory, xyyaw, scan, guess, last)
-            score[k], information[k] = found.score, found.information
-            is_break[k] = found.score < POOR
-            xyyaw[k] = guess if is_break[k] else found.xyyaw
+            laid = _lay(memory, xyyaw, scan, guess, last)
+            score[k], information[k] = laid.score, laid.information
+            is_break[k] = laid.score < POOR
+            xyyaw[k] = guess if is_break[k] else laid.xyyaw
         if is_break[k]:
             memory = []
         # Without odometry the scans come at sensor rate: what hardly moved adds nothing.
         step = se2.between(xyyaw[memory[-1][0]], xyyaw[k]) if memory else np.ones(3)
         if odometry is not None or np.hypot(step[0], step[1]) > 0.1 or abs(step[2]) > 0.1:
             memory = [*memory[1 - MEMORY :], (k, scan)]
-    return Chain(xyyaw, score, is_break, information)
+    is_solid = (score >= GOOD) & ~is_break
+    if odometry is not None:
+        off = se2.between(
+            se2.between(odometry[:-1], odometry[1:]), se2.between(xyyaw[:-1], xyyaw[1:])
+        )
+        is_solid[1:] &= (np.hypot(off[:, 0], off[:, 1]) < AGREE_M) & (np.abs(off[:, 2]) < AGREE_RAD)
+    return Chain(xyyaw, score, is_break, is_solid, information)
 
 
 def _lay(

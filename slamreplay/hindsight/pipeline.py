@@ -17,11 +17,16 @@ from slamreplay.bundle.view import BundleView
 from slamreplay.geometry import se2
 from slamreplay.geometry.covariance import planar_from_gtsam
 from slamreplay.hindsight.beams import Beams, beams_of
-from slamreplay.hindsight.carry import carry, scan_scores
+from slamreplay.hindsight.carry import carry, scan_scores, settle
 from slamreplay.hindsight.chain import Chain, scan_matched
 from slamreplay.hindsight.changes import find_changes
 from slamreplay.hindsight.keyframes import keyframes
-from slamreplay.hindsight.places import best_places
+from slamreplay.hindsight.places import (
+    JUMP_BROKEN,
+    JUMP_DOUBTFUL,
+    JUMP_SOLID,
+    best_places,
+)
 from slamreplay.hindsight.search import hypotheses_of
 from slamreplay.hindsight.seating import seat_keyframes
 from slamreplay.hindsight.smoothing import smooth
@@ -74,15 +79,15 @@ def hindsight(view: BundleView, *, progress: Progress | None = None) -> Hindsigh
         is_break,
         lambda share: say("places on the map", 0.3 + 0.4 * share),
     )
-    places = best_places(hypotheses, motions, is_break)
+    places = best_places(hypotheses, motions, _jump_costs(chain, found))
     start, is_open = seat_keyframes(field, points, chain, found, places)
     say("pose graph", 0.7)
     poses, cov = smooth(field, points, start, chain, is_open)
     say("every scan", 0.8)
     owner = owners(found, len(keys))
     trusted = (owner >= 0) & (places.score[owner] >= MIN_PLACE_SCORE)
-    carried, share = carry(beams.t_ns, odometry, keys, poses, is_open, beams, field)
-    scan_cov = cov[share]
+    carried, share = carry(odometry, keys, poses, is_open, beams, field)
+    carried, scan_cov = settle(carried, cov[share], odometry, keys[share], beams, field)
     carried[~trusted[share]], scan_cov[~trusted[share]] = np.nan, np.nan
     match = scan_scores(field, beams, carried)
     say("changes", 0.85)
@@ -128,6 +133,15 @@ def _nowhere(frame: str, base: str, beams: Beams) -> Hindsight:
     n = len(beams)
     track = PoseTrack.without_covariance(frame, base, beams.t_ns, np.full((n, 3), np.nan))
     return Hindsight(track, float("nan"), 0.0, np.full(n, np.nan), None, None)
+
+
+def _jump_costs(chain: Chain, found: list[Submap]) -> se2.Array:
+    reference = np.array([s.reference for s in found])
+    costs = np.full(len(found) - 1, JUMP_SOLID)
+    for bad, cost in ((~chain.is_solid, JUMP_DOUBTFUL), (chain.is_break, JUMP_BROKEN)):
+        count = np.cumsum(bad)
+        costs[count[reference[1:]] > count[reference[:-1]]] = cost
+    return costs
 
 
 def _to_track(

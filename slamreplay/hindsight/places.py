@@ -13,8 +13,9 @@ from slamreplay.geometry import se2
 #: A submap's mean score times this is its log-likelihood: some 120 independent points.
 WEIGHT = 120.0
 SIGMA_M, SIGMA_RAD = 0.2, 0.08
-#: The cost at which any jump is believed (a kidnapped robot); less where the chain is broken.
-JUMP, JUMP_AT_BREAK = 25.0, 8.0
+#: The cost at which a jump is believed (a kidnapped robot), where the chain of scans in between is
+#: solid (scans and odometry agree: it takes several submaps' evidence), doubtful, or broken.
+JUMP_SOLID, JUMP_DOUBTFUL, JUMP_BROKEN = 100.0, 25.0, 8.0
 #: Two places are different places beyond this.
 APART_M, APART_RAD = 0.5, 0.35
 
@@ -51,14 +52,14 @@ class Places:
 
 
 def best_places(
-    hypotheses: Sequence[Hypotheses], motions: se2.Array, is_break: NDArray[np.bool_]
+    hypotheses: Sequence[Hypotheses], motions: se2.Array, jump_cost: se2.Array
 ) -> Places:
     """The most probable sequence of hypotheses.
 
     Args:
         hypotheses: of S >= 1 submaps, each with at least one.
         motions: (S - 1, 3) measured motion from each submap's reference to the next one's.
-        is_break: (S - 1,) whether that measurement is worthless.
+        jump_cost: (S - 1,) what it costs to believe that it moved otherwise.
     """
     unary = [WEIGHT * h.score for h in hypotheses]
     pairs = []
@@ -66,7 +67,7 @@ def best_places(
         expected = se2.compose(hypotheses[s].xyyaw, motion)
         miss = se2.between(expected[:, None, :], hypotheses[s + 1].xyyaw[None, :, :])
         cost = ((miss / np.array([SIGMA_M, SIGMA_M, SIGMA_RAD])) ** 2).sum(axis=-1)
-        pairs.append(-np.minimum(0.5 * cost, JUMP_AT_BREAK if is_break[s] else JUMP))
+        pairs.append(-np.minimum(0.5 * cost, jump_cost[s]))
     chosen, total, through = _viterbi(unary, pairs)
     poses = np.array([h.xyyaw[i] for h, i in zip(hypotheses, chosen, strict=True)])
     different = [_differs(h.xyyaw, pose) for h, pose in zip(hypotheses, poses, strict=True)]
@@ -80,8 +81,8 @@ def best_places(
     )
     jumps = np.array(
         [
-            pair[a, b] <= -(JUMP_AT_BREAK if broken else JUMP) + 1e-9
-            for pair, a, b, broken in zip(pairs, chosen[:-1], chosen[1:], is_break, strict=True)
+            pair[a, b] <= 1e-9 - cost
+            for pair, a, b, cost in zip(pairs, chosen[:-1], chosen[1:], jump_cost, strict=True)
         ],
         dtype=bool,
     )

@@ -24,6 +24,8 @@ MIN_SCORE = 0.3
 #: Neighbouring keyframes match the same walls with the same errors of the map: about this many
 #: anchors say one thing, so each is given that much more variance.
 SAME_EVIDENCE = 10.0
+#: Mean score from which on a match is taken at its word.
+DOUBT_BELOW = 0.75
 #: What a map and a scanner leave in any match: metres, metres, radians.
 FLOOR = np.array([0.02, 0.02, 0.004])
 
@@ -54,9 +56,22 @@ def smooth(
         held = np.flatnonzero([m.score >= MIN_SCORE for m in tops])
         anchors = np.array([tops[k].xyyaw for k in held]).reshape(-1, 3)
         information = np.array([tops[k].information for k in held]).reshape(-1, 3, 3)
-        anchor_cov = SAME_EVIDENCE * _covariance(information, np.array([1.0, 1.0, 0.3]))
-        poses, spread = smooth_chain(poses, motions, cov, is_open, held, anchors, anchor_cov)
+        anchor_cov = match_covariance(information, np.array([tops[k].score for k in held]))
+        poses, spread = smooth_chain(
+            poses, motions, cov, is_open, chain.is_solid[1:], held, anchors, anchor_cov
+        )
     return poses, spread + np.diag(FLOOR**2)
+
+
+def match_covariance(information: se2.Array, score: se2.Array) -> se2.Array:
+    """(N, 3, 3) covariance of matches to the map from their curvature (N, 3, 3) and scores (N,).
+
+    A match that leaves many points unexplained may be the right one in a changed place, or the
+    nearest wrong one: its variance grows fast as its score falls.
+    """
+    doubt = np.maximum(1.0, DOUBT_BELOW / np.maximum(score, 0.1)) ** 6
+    cov = _covariance(information, np.array([1.0, 1.0, 0.3]))
+    return SAME_EVIDENCE * cov * doubt[:, None, None]
 
 
 def _motion_covariance(chain: Chain, motions: se2.Array) -> se2.Array:
