@@ -11,6 +11,7 @@ from importlib.resources import files
 from jinja2 import Environment, StrictUndefined
 from matplotlib.figure import Figure
 
+from slamreplay.report.clean import clean
 from slamreplay.report.evidence import Postmortem
 from slamreplay.report.figures import canvas
 from slamreplay.report.figures.course import course_figure
@@ -44,9 +45,10 @@ def html(post: Postmortem) -> str:
         autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
     environment.filters["bound"] = bound
-    return environment.from_string(source).render(
+    text = environment.from_string(source).render(
         page=view, policy=policy, style=style, **_pictures(post, view)
     )
+    return clean(text)
 
 
 def _pictures(post: Postmortem, view: Page) -> dict[str, Picture | None]:

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import re
 from xml.etree import ElementTree as ET
 
 from slamreplay.bundle.findings import FINDINGS, Finding
 from slamreplay.geometry.times import decimal_seconds
 from slamreplay.report.assess import not_assessable, title_of
+from slamreplay.report.clean import clean
 from slamreplay.report.evidence import Postmortem
-
-# XML 1.0 has no place for most control characters, escaped or not; log text may hold any.
-_NO_XML = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 
 def junit_xml(post: Postmortem) -> str:
@@ -24,23 +21,23 @@ def junit_xml(post: Postmortem) -> str:
     name = ", ".join(source.name for source in post.manifest.sources) or post.manifest.bundle_id
     found = [finding.id for finding in post.findings]
     ids = [*FINDINGS, *sorted(set(found) - set(FINDINGS))]
-    suite = ET.Element("testsuite", name=_clean(name))
+    suite = ET.Element("testsuite", name=clean(name))
     failures = 0
     for id_ in ids:
         case = ET.SubElement(
-            suite, "testcase", classname=_clean(name), name=f"{id_} {title_of(id_)}", time="0"
+            suite, "testcase", classname=clean(name), name=f"{id_} {title_of(id_)}", time="0"
         )
         answers = [finding for finding in post.findings if finding.id == id_]
         errors = [finding for finding in answers if finding.severity == "error"]
         if errors:
             failures += 1
-            failure = ET.SubElement(case, "failure", type=id_, message=_clean(errors[0].message))
+            failure = ET.SubElement(case, "failure", type=id_, message=clean(errors[0].message))
             failure.text = "\n".join(_line(finding, post) for finding in answers)
         elif answers:
             out = ET.SubElement(case, "system-out")
             out.text = "\n".join(_line(finding, post) for finding in answers)
         elif id_ in skipped:
-            ET.SubElement(case, "skipped", message=_clean(skipped[id_]))
+            ET.SubElement(case, "skipped", message=clean(skipped[id_]))
     counts = {
         "tests": str(len(ids)),
         "failures": str(failures),
@@ -62,8 +59,4 @@ def _line(finding: Finding, post: Postmortem) -> str:
     times = [t for t in (finding.start_ns, finding.end_ns) if t is not None]
     span = " to ".join(decimal_seconds(int(t) - start)[:-6] for t in times)
     where = f" [{span} s]" if span else ""
-    return _clean(f"{finding.severity}{where}: {finding.message}")
-
-
-def _clean(text: str) -> str:
-    return _NO_XML.sub("\ufffd", text)
+    return clean(f"{finding.severity}{where}: {finding.message}")

@@ -15,6 +15,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
 from slamreplay.bundle.findings import Severity
 from slamreplay.bundle.schema import PARTS
+from slamreplay.report.clean import clean
 from slamreplay.verdict.judgement import FailureKind, State
 
 SCHEMA_VERSION: Literal[1] = 1
@@ -33,6 +34,7 @@ def _whole(value: Any) -> int | None:
 
 
 Number = Annotated[float | None, BeforeValidator(_finite)]
+Text = Annotated[str, BeforeValidator(clean)]
 Count = Annotated[int | None, BeforeValidator(_whole)]
 Ns = Annotated[int, BeforeValidator(_whole)]
 Share = Annotated[Annotated[float, Field(ge=0.0, le=1.0)] | None, BeforeValidator(_finite)]
@@ -47,10 +49,10 @@ class BundlePart(_Strict):
     """The evidence: where it came from, its time range in ns on `clock`, what it lacks."""
 
     id: str
-    sources: list[str]
+    sources: list[Text]
     start_ns: Ns
     end_ns: Ns
-    clock: str
+    clock: Text
     map_version: str | None
     missing: list[str] = Field(json_schema_extra={"items": {"enum": list(PARTS)}})
 
@@ -60,7 +62,7 @@ class VerdictPart(_Strict):
 
     state: State
     confidence: Share
-    summary: str
+    summary: Text
 
 
 class IntervalPart(_Strict):
@@ -94,7 +96,7 @@ class RegionPart(_Strict):
 class ReferencePart(_Strict):
     """What the belief was judged against; `trajectory` is the file's name beside report.json."""
 
-    kind: str | None
+    kind: Text | None
     trajectory: str | None
     sigma_m: Number
     coverage: Share
@@ -105,7 +107,7 @@ class FailureModePart(_Strict):
 
     kind: FailureKind
     confidence: Share
-    evidence: list[str]
+    evidence: list[Text]
 
 
 class StopPart(_Strict):
@@ -115,7 +117,7 @@ class StopPart(_Strict):
     x_m: Number
     y_m: Number
     state: State
-    cause: str
+    cause: Text
 
 
 class ActionPart(_Strict):
@@ -127,7 +129,7 @@ class ActionPart(_Strict):
 
     t_ns: Ns
     kind: Literal["recovery", "motion"]
-    name: str
+    name: Text
     sigma_m: Number
     clearance_m: Number
     ratio: Number
@@ -139,14 +141,14 @@ class FindingPart(_Strict):
 
     id: str
     severity: Severity
-    title: str
-    message: str
+    title: Text
+    message: Text
     start_ns: Count
     end_ns: Count
     value: Number
     low: Number
     high: Number
-    unit: str
+    unit: Text
     n: Count
     n_eff: Number
 
@@ -157,10 +159,10 @@ class TrialPart(_Strict):
     A trial the estimator could not honour has the one metric `not_applicable`, true.
     """
 
-    estimator: str
+    estimator: Text
     perturbation: str | None
     level: Number
-    unit: str
+    unit: Text
     metrics: dict[str, bool | Number]
 
 

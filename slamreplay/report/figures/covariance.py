@@ -137,6 +137,7 @@ def _draw_nees(axes: Axes, post: Postmortem, size: float) -> list[object]:
         zorder=4,
     )
     axes.set_yscale("log")
+    axes.yaxis.set_major_formatter("{x:g}")
     axes.set_ylim(floor, max(30.0, 2.0 * float(np.nanmax(value))))
     axes.axhline(summary.dof, color=FAINT, linestyle="--", linewidth=1.0, zorder=3)
     handles: list[object] = [

@@ -242,6 +242,6 @@ def _draw_regions(axes: Axes, post: Postmortem, size: float) -> None:
                 fontsize=size - 1,
                 fontweight="bold",
                 color=INK,
-                zorder=8,
+                zorder=7,
                 bbox={"boxstyle": "round,pad=0.15", "fc": "white", "ec": INK, "lw": 0.6},
             )

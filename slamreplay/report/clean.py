@@ -1,0 +1,13 @@
+"""Text of a log made fit for any file: a log may hold what XML and UTF-8 have no place for."""
+
+from __future__ import annotations
+
+import re
+
+# XML 1.0 section 2.2: no control characters but tab and line ends, no surrogates, escaped or not.
+_UNFIT = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+
+
+def clean(text: str) -> str:
+    """The text with unfit characters replaced by U+FFFD."""
+    return _UNFIT.sub("\N{REPLACEMENT CHARACTER}", text)

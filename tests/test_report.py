@@ -1,0 +1,374 @@
+"""The report's files say what the post-mortem says, and nothing a log holds can break them."""
+
+import json
+import math
+import re
+from dataclasses import replace
+from html.parser import HTMLParser
+from pathlib import Path
+from xml.etree import ElementTree as ET
+
+import jsonschema
+import numpy as np
+import pytest
+import yaml
+from PIL import Image
+
+from slamreplay.bundle.findings import FINDINGS, Finding
+from slamreplay.bundle.manifest import Source
+from slamreplay.bundle.products import ChangedRegion, Changes, Hindsight
+from slamreplay.bundle.run import Estimate, Run, Trial
+from slamreplay.bundle.track import PoseTrack
+from slamreplay.consistency.nees import nees
+from slamreplay.errors import OutputError
+from slamreplay.maps.map_server import read_map
+from slamreplay.report.build import build
+from slamreplay.report.evidence import Postmortem, TrialResult
+from slamreplay.report.facts import deciding_facts
+from slamreplay.report.html import html
+from slamreplay.report.junit import junit_xml
+from slamreplay.report.model import SCHEMA_FILE, Report, schema_text
+from slamreplay.report.phrases import bound
+from slamreplay.report.trajectory import tum
+from slamreplay.report.writer import write_report
+from slamreplay.testing.synthetic import START_NS, room_grid, synthetic_bundle, true_path
+from slamreplay.verdict.judgement import Action, FailureMode, Interval, Judgement, Stop
+from slamreplay.verdict.limits import Limits
+
+S = 1_000_000_000
+HOSTILE = '<script>alert(1)</script> & "quoted" \x00\x1b[31m \ud800'
+
+
+@pytest.fixture(scope="module")
+def post() -> Postmortem:
+    """A log of 20 s: lost from 10 s on, an aisle that changed, two trials."""
+    bundle = synthetic_bundle(seconds=20.0)
+    t = START_NS + np.arange(200, dtype=np.int64) * (S // 10)
+    truth = true_path((t - START_NS) / S)
+    cov = np.broadcast_to(np.diag([4e-4, 4e-4, 1e-4]), (200, 3, 3)).copy()
+    off = np.where((np.arange(200) >= 100)[:, None], [1.5, 0.0, 0.1], 0.0)
+    belief = PoseTrack("map", "base_link", t, truth + off, cov)
+    where = PoseTrack("map", "base_link", t, truth.copy(), cov.copy())
+    grid = room_grid()
+    appeared, removed = (np.zeros(grid.cells.shape, dtype=bool) for _ in range(2))
+    appeared[60:75, 170:200] = True
+    removed[160:170, 150:190] = True
+    share = np.where(np.arange(200) >= 150, 0.2, np.nan)
+    regions = (
+        ChangedRegion("appeared", (4.6, 4.6, 6.0, 5.6), 1.1, int(t[150]), int(t[199]), 84, 0.97),
+        ChangedRegion(
+            "moved", (1, 2, 3, 4), 0.8, int(t[150]), int(t[199]), 40, 0.9, (5.0, 6.0, 7.0, 8.0)
+        ),
+    )
+    changes = Changes(appeared, removed, regions, t, share, 0.7 * share, 0.3 * share)
+    found = Hindsight(where, 0.02, 1.0, np.full(200, 0.8), 0.13, changes)
+    end = int(bundle.manifest.end_ns)
+    findings = (
+        Finding("SR-LOC-001", "error", "off by 1.5 m", START_NS + 10 * S, end, 1.5, 0.0, 0.5, "m"),
+        Finding("SR-DAT-002", "warning", HOSTILE),
+        Finding("OTHER-7", "info", "of somebody else's check", value=math.nan),
+    )
+    judgement = Judgement(
+        "lost",
+        0.98,
+        "The robot was lost for 10 s.",
+        (
+            Interval("healthy", START_NS, START_NS + 10 * S, 0.97, 0.0, 0.0),
+            Interval("lost", START_NS + 10 * S, end, 0.98, 1.5, 0.1, ("SR-LOC-001",)),
+        ),
+        FailureMode("kidnapped", 0.9, ("it jumped",)),
+        (Stop(START_NS + 12 * S, 1.0, 2.0, "lost", "it was lost"),),
+        (Action(START_NS + 13 * S, "recovery", "Spin", 0.2, 0.3, 2.0, allowed=False),),
+        findings,
+    )
+    runs = (
+        Run(Trial("b", "amcl", 0), Estimate(where)),
+        Run(Trial("b", "amcl", 0, "tf_delay.all", 0.2, "s"), Estimate(belief)),
+        Run(Trial("b", "dead_reckoning", 0, "particles.n", 0.5, "ratio"), None, "has none"),
+    )
+    source = Source(name="run <1> & 2.mcap", format="mcap", bytes=7, sha256="ab" * 32)
+    return Postmortem(
+        manifest=bundle.manifest.model_copy(update={"sources": [source]}),
+        grid=grid,
+        belief=belief,
+        hindsight=found,
+        reference=where,
+        reference_kind="hindsight",
+        judgement=judgement,
+        findings=findings,
+        limits=Limits(),
+        nees=nees(belief, where),
+        trials=tuple(TrialResult(run, {"nees_mean": 3.0 + k}) for k, run in enumerate(runs)),
+    )
+
+
+@pytest.fixture(scope="module")
+def folder(post, tmp_path_factory) -> Path:
+    """The report of `post`."""
+    return write_report(post, tmp_path_factory.mktemp("reports") / "r").parent
+
+
+@pytest.fixture(scope="module")
+def bare(post) -> Postmortem:
+    """The same log without map, belief, reference and trials."""
+    judgement = Judgement(
+        "insufficient_data",
+        None,
+        "It cannot be told.",
+        (Interval("insufficient_data", post.manifest.start_ns, post.manifest.end_ns),),
+        FailureMode("none", None, ()),
+        (Stop(START_NS, None, None, "insufficient_data", "unknown"),),
+        (Action(START_NS, "motion", "plan", None, None, None, None),),
+        (),
+    )
+    return Postmortem(
+        manifest=post.manifest,
+        grid=None,
+        belief=None,
+        hindsight=None,
+        reference=None,
+        reference_kind=None,
+        judgement=judgement,
+        findings=(),
+        limits=Limits(),
+    )
+
+
+def test_shipped_schema_is_the_models():
+    assert SCHEMA_FILE.read_text(encoding="utf-8") == schema_text()
+    jsonschema.Draft202012Validator.check_schema(json.loads(schema_text()))
+
+
+def test_report_json_has_the_contracts_keys_and_is_valid(post, bare):
+    schema = json.loads(schema_text())
+    for each in (post, bare):
+        content = json.loads(build(each).json_text(), parse_constant=pytest.fail)
+        jsonschema.validate(content, schema)
+        assert list(content) == [
+            "schema_version", "slamreplay", "bundle", "verdict", "intervals", "changed_regions",
+            "reference", "failure_mode", "stops", "actions", "findings", "trials",
+        ]  # fmt: skip
+        assert Report.model_validate_json(build(each).json_text()) == build(each)
+
+
+def test_every_key_is_there_and_the_unknown_is_null(post, bare):
+    content = json.loads(build(bare).json_text())
+
+    assert content["verdict"]["confidence"] is None
+    assert content["bundle"]["map_version"] is None
+    assert content["reference"] == {
+        "kind": None, "trajectory": None, "sigma_m": None, "coverage": None
+    }  # fmt: skip
+    assert content["intervals"][0]["max_error_m"] is None
+    assert content["stops"][0]["x_m"] is None
+    assert content["actions"][0]["allowed"] is None
+    full = json.loads(build(post).json_text())
+    assert full["findings"][2]["value"] is None  # it was NaN
+    assert full["findings"][2]["title"] == "OTHER-7"
+    assert set(full["findings"][0]) == {
+        "id", "severity", "title", "message", "start_ns", "end_ns", "value", "low", "high", "unit",
+        "n", "n_eff",
+    }  # fmt: skip
+
+
+def test_moved_region_names_its_old_place_and_others_none(post):
+    regions = json.loads(build(post).json_text())["changed_regions"]
+
+    assert regions[0]["from_bbox_m"] is None
+    assert regions[1]["from_bbox_m"] == [5.0, 6.0, 7.0, 8.0]
+    assert regions[1]["bbox_m"] == [1.0, 2.0, 3.0, 4.0]
+
+
+def test_trial_that_does_not_apply_is_marked(post):
+    trials = json.loads(build(post).json_text())["trials"]
+
+    assert [t["perturbation"] for t in trials] == [None, "tf_delay.all", "particles.n"]
+    assert trials[0]["level"] is None
+    assert trials[1] == {
+        "estimator": "amcl", "perturbation": "tf_delay.all", "level": 0.2, "unit": "s",
+        "metrics": {"nees_mean": 4.0},
+    }  # fmt: skip
+    assert trials[2]["metrics"] == {"not_applicable": True}
+
+
+def test_unknown_state_is_refused(post):
+    judgement = replace(post.judgement, state="confused")
+
+    with pytest.raises(ValueError, match="state"):
+        build(replace(post, judgement=judgement))
+
+
+def test_numpy_numbers_become_plain_ones(post):
+    finding = Finding("SR-LOC-001", "error", "m", np.int64(1), value=np.float64(2.0), n=np.int64(3))
+
+    row = json.loads(build(replace(post, findings=(finding,))).json_text())["findings"][0]
+
+    assert (row["start_ns"], row["value"], row["n"]) == (1, 2.0, 3)
+
+
+def test_tum_has_exact_stamps_in_order_and_no_rows_without_pose():
+    t = np.array([1_700_000_000_123_456_789, 1_700_000_000_000_000_001, 5], dtype=np.int64)
+    xyyaw = np.array([[1.0, -2.0, np.pi / 2], [-1e-12, 0.5, 0.0], [np.nan, 0.0, 0.0]])
+
+    lines = tum(PoseTrack.without_covariance("map", "base", t, xyyaw)).splitlines()
+
+    level = "0.000000 0.000000000 0.000000000"
+    assert lines == [
+        f"1700000000.000000001 0.000000 0.500000 {level} 0.000000000 1.000000000",
+        f"1700000000.123456789 1.000000 -2.000000 {level} 0.707106781 0.707106781",
+    ]
+
+
+def test_changed_map_lies_on_the_map(post, folder):
+    pixels = np.flipud(np.asarray(Image.open(folder / "changed.pgm")))
+    meta = yaml.safe_load((folder / "changed.yaml").read_text())
+    grid = read_map(folder / "changed.yaml", warn=pytest.fail)
+
+    assert pixels.shape == post.grid.cells.shape
+    np.testing.assert_array_equal(pixels == 0, post.hindsight.changes.appeared)
+    np.testing.assert_array_equal(pixels == 254, post.hindsight.changes.removed)
+    assert (pixels == 205).sum() == pixels.size - (pixels == 0).sum() - (pixels == 254).sum()
+    assert meta["origin"] == post.grid.origin_xyyaw.tolist()
+    assert grid.resolution_m == post.grid.resolution_m
+
+
+def test_without_a_map_there_is_no_trajectory_and_no_changed_map(bare, tmp_path):
+    page = write_report(bare, tmp_path / "r")
+
+    assert page == tmp_path / "r" / "report.html"
+    assert sorted(p.name for p in page.parent.iterdir()) == [
+        "junit.xml", "report.html", "report.json"
+    ]  # fmt: skip
+
+
+def test_same_post_mortem_gives_same_bytes_whatever_the_users_style(post, folder, tmp_path):
+    import matplotlib as mpl
+
+    with mpl.rc_context({"axes.facecolor": "black", "font.size": 30.0, "lines.linewidth": 9.0}):
+        write_report(post, tmp_path / "two")
+
+    names = sorted(p.name for p in folder.iterdir())
+    assert names == [
+        "changed.pgm", "changed.yaml", "hindsight.tum", "junit.xml", "report.html", "report.json"
+    ]  # fmt: skip
+    for name in names:
+        assert (folder / name).read_bytes() == (tmp_path / "two" / name).read_bytes()
+
+
+def test_own_report_is_replaced_and_a_foreign_folder_is_not(post, bare, tmp_path):
+    write_report(replace(bare, grid=post.grid), tmp_path / "r")
+    assert (tmp_path / "r" / "changed.pgm").exists()
+    write_report(bare, tmp_path / "r")
+    assert not (tmp_path / "r" / "changed.pgm").exists()
+
+    (tmp_path / "thesis").mkdir()
+    (tmp_path / "thesis" / "chapter.tex").write_text("mine")
+    with pytest.raises(OutputError, match=r"report\.json"):
+        write_report(bare, tmp_path / "thesis")
+    assert [p.name for p in (tmp_path / "thesis").iterdir()] == ["chapter.tex"]
+
+
+class _Page(HTMLParser):
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.tags: list[tuple[str, dict[str, str | None]]] = []
+        self.feed(text)
+
+    def handle_starttag(self, tag, attrs):
+        self.tags.append((tag, dict(attrs)))
+
+    def all(self, name: str) -> list[dict[str, str | None]]:
+        return [attributes for tag, attributes in self.tags if tag == name]
+
+
+def test_page_runs_nothing_loads_nothing_and_escapes_the_log(folder):
+    text = (folder / "report.html").read_text(encoding="utf-8")
+    page = _Page(text)
+
+    assert not page.all("script")
+    assert "&lt;script&gt;alert(1)" in text
+    assert "run &lt;1&gt; &amp; 2.mcap" in text
+    assert not any(name.startswith("on") for _, found in page.tags for name in found)
+    links = [a.get(k) for _, a in page.tags for k in ("src", "href", "srcset") if a.get(k)]
+    assert links
+    assert all(link.startswith("data:image/svg+xml;base64,") for link in links)
+    policy = next(m["content"] for m in page.all("meta") if "http-equiv" in m)
+    assert "default-src 'none'" in policy
+    assert "unsafe" not in policy
+
+
+def test_pages_own_style_is_the_one_its_policy_allows(bare):
+    import base64
+    import hashlib
+
+    text = html(bare)
+    style = re.search(r"<style>(.*?)</style>", text, re.DOTALL).group(1)
+    digest = base64.b64encode(hashlib.sha256(style.encode()).digest()).decode()
+
+    assert f"&#39;sha256-{digest}&#39;" in text
+    assert not any("style" in a for _, a in _Page(text).tags)
+
+
+def test_page_shows_the_verdict_the_figures_and_what_is_missing(folder, bare):
+    text = (folder / "report.html").read_text(encoding="utf-8")
+    images = _Page(text).all("img")
+
+    assert len(images) == 3
+    assert all(image["alt"] for image in images)
+    assert "The robot was lost for 10\N{NO-BREAK SPACE}s." in text
+    assert FINDINGS["SR-LOC-001"].misleads in text
+    assert "ab" * 32 in text
+    assert "baseline 3" in text  # beside the perturbed number
+    assert len(text) < 2_000_000
+    empty = html(bare)
+    assert "No path is known" in empty
+    assert "no localizer spoke" in empty
+    assert "No imu" in empty
+
+
+def test_facts_are_numbers_of_the_post_mortem(post, bare):
+    belief, world, where = deciding_facts(post)
+
+    assert (belief.number, belief.alarming) == ("1.50 m", True)
+    assert "±2 cm" in belief.detail
+    assert world.number == "20.0 %"
+    assert where.number == "±2 cm"
+    assert [f.number for f in deciding_facts(bare)] == ["no belief", "no map", "none"]
+
+
+def test_junit_fails_on_errors_and_skips_what_could_not_be_asked(post, bare):
+    cases = {c.get("name").split()[0]: c for c in ET.fromstring(junit_xml(post)).iter("testcase")}
+
+    assert set(cases) == {*FINDINGS, "OTHER-7"}
+    assert cases["SR-LOC-001"].find("failure").get("message") == "off by 1.5 m"
+    assert cases["SR-DAT-002"].find("failure") is None
+    assert "<script>" in cases["SR-DAT-002"].find("system-out").text
+    assert not list(cases["SR-MAP-001"])
+    suite = ET.fromstring(junit_xml(bare)).find("testsuite")
+    skipped = {c.get("name").split()[0] for c in suite if c.find("skipped") is not None}
+    assert {"SR-LOC-001", "SR-MAP-001", "SR-CON-001"} <= skipped
+    assert int(suite.get("skipped")) == len(skipped)
+    assert int(suite.get("tests")) == len(suite.findall("testcase"))
+    assert suite.get("failures") == "0"
+
+
+def test_numbers_are_tied_to_their_units():
+    tied = bound("from 0.2 s to 3 m, 8 % of 4 more m")
+
+    assert tied.split(" ") == [
+        "from",
+        "0.2\xa0s",
+        "to",
+        "3\xa0m,",
+        "8\xa0%",
+        "of",
+        "4",
+        "more",
+        "m",
+    ]
+
+
+def test_templates_ship_with_the_package():
+    folder = Path(SCHEMA_FILE).parent / "templates"
+
+    assert {p.name for p in folder.iterdir()} == {"report.css", "report.html.j2"}
