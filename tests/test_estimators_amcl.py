@@ -71,7 +71,13 @@ def test_likelihoods_equal_plain_numpy_in_a_turned_grid():
     cloud, ends = particles(), np.random.default_rng(3).normal(0.0, 4.0, (50, 2))
     scores = np.random.default_rng(4).random(ROOM.cells.shape).astype(np.float32)
 
-    got = kernels.likelihoods(cloud, ends, scores, 0.25, ROOM.origin_xyyaw, ROOM.resolution_m)
+    got = kernels.likelihoods(
+        cloud,
+        np.ascontiguousarray(ends.T),
+        np.pad(scores, 1, constant_values=0.25),
+        ROOM.origin_xyyaw,
+        ROOM.resolution_m,
+    )
 
     cell = ROOM.cell_of(se2.transform_points(cloud, np.broadcast_to(ends, (300, 50, 2))))
     inside = ROOM.inside(cell)

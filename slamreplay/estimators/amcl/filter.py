@@ -36,7 +36,7 @@ class AmclFilter:
         self._grid = grid
         self._rng = np.random.Generator(np.random.PCG64(seed))
         self._distance_m = distance_field(grid, config.laser_likelihood_max_dist)
-        self._scores = (np.empty((0, 0), np.float32), 0.0)
+        self._scores = np.empty((0, 0), dtype=np.float32)
         self._scores_range_m = np.nan
         self._last_odometry: se2.Array | None = None
         self._updates = 0
@@ -185,17 +185,15 @@ class AmclFilter:
         with np.errstate(invalid="ignore"):
             used &= np.asarray(usable, dtype=bool) & (reach < reach_m)
         ends = reach[used, None] * np.column_stack([np.cos(bearing[used]), np.sin(bearing[used])])
-        return np.ascontiguousarray(se2.transform_points(xyyaw_base_laser, ends))
+        return np.ascontiguousarray(se2.transform_points(xyyaw_base_laser, ends).T)
 
     def _weigh(self, ends: se2.Array, reach_m: float) -> None:
         if self._scores_range_m != reach_m:
             self._scores, self._scores_range_m = self._score_table(reach_m), reach_m
-        table, off_map = self._scores
         likelihood = kernels.likelihoods(
             self._particles,
             ends,
-            table,
-            off_map,
+            self._scores,
             self._grid.origin_xyyaw,
             self._grid.resolution_m,
         )
@@ -208,16 +206,13 @@ class AmclFilter:
         self._ess = float(1.0 / np.sum(weights**2))
         self._adopt(self._particles, weights)
 
-    def _score_table(self, reach_m: float) -> tuple[NDArray[np.float32], float]:
+    def _score_table(self, reach_m: float) -> NDArray[np.float32]:
         """A beam's likelihood cubed, by the cell it ends in: nav2's ad-hoc weighting scheme."""
         c = self._config
-        uniform = c.z_rand / reach_m
-
-        def score(distance: NDArray) -> NDArray:
-            return (c.z_hit * np.exp(-(distance**2) / (2.0 * c.sigma_hit**2)) + uniform) ** 3
-
-        table = score(self._distance_m.astype(np.float64)).astype(np.float32)
-        return table, float(score(np.array(c.laser_likelihood_max_dist)))
+        border = c.laser_likelihood_max_dist
+        distance = np.pad(self._distance_m.astype(np.float64), 1, constant_values=border)
+        likelihood = c.z_hit * np.exp(-(distance**2) / (2.0 * c.sigma_hit**2)) + c.z_rand / reach_m
+        return (likelihood**3).astype(np.float32)
 
     def _resample(self) -> None:
         c = self._config
