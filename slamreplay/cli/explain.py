@@ -43,4 +43,7 @@ def _explain(
         ("it misleads", explanation.misleads),
     ):
         indent = " " * 14
-        typer.echo(fill(text, 100, initial_indent=f"  {head:<12}", subsequent_indent=indent))
+        first = f"  {head:<12}"
+        typer.echo(
+            fill(text, 100, initial_indent=first, subsequent_indent=indent, break_on_hyphens=False)
+        )

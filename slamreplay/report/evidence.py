@@ -20,6 +20,7 @@ from slamreplay.geometry.times import seconds_since
 from slamreplay.maps.grid import OccupancyGrid
 from slamreplay.verdict.judgement import Judgement
 from slamreplay.verdict.limits import Limits
+from slamreplay.verdict.map_frame import ConstantOffset
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,6 +46,7 @@ class Postmortem:
         findings: those of the verdict and of every check, worst first.
         limits: the thresholds the verdict was found with.
         odometry: the path by odometry alone, drawn where nothing better is known.
+        frame_offset: what the verdict took out of the belief: its map lies elsewhere than this one.
         nees: of the belief at its own updates, None without covariance or reference.
         trials: perturbation trials, baseline first.
     """
@@ -59,6 +61,7 @@ class Postmortem:
     findings: tuple[Finding, ...]
     limits: Limits
     odometry: PoseTrack | None = None
+    frame_offset: ConstantOffset | None = None
     nees: Nees | None = None
     trials: tuple[TrialResult, ...] = ()
 
@@ -68,11 +71,17 @@ class Postmortem:
 
     @cached_property
     def error(self) -> BeliefError | None:
-        """Belief against hindsight at the belief's times, None without either."""
+        """Belief against hindsight at the belief's times, None without either.
+
+        As the verdict sees it: without the constant offset of a map frame that lies elsewhere.
+        """
         if self.belief is None or self.hindsight is None:
             return None
+        believed = self.belief.xyyaw
+        if self.frame_offset is not None:
+            believed = se2.compose(se2.inverse(self.frame_offset.xyyaw), believed)
         where = self.hindsight.track.at(self.belief.t_ns)
-        step = self.belief.xyyaw - where.xyyaw
+        step = believed - where.xyyaw
         return BeliefError(
             self.belief.t_ns,
             np.hypot(step[:, 0], step[:, 1]),

@@ -42,6 +42,8 @@ def _belief(post: Postmortem) -> Fact:
         f"(over {limits.position_m:g} m or {np.degrees(limits.yaw_rad):.0f} deg "
         f"for {limits.lost_s:g} s)."
     )
+    if post.frame_offset is not None:
+        detail = f"The constant shift of the map frame is taken out. {detail}"
     sigma = sigma_position_m(post.belief)[worst]
     if np.isfinite(sigma):
         detail += f" The filter claimed ±{_length(float(sigma))} (1 sigma) at that moment."

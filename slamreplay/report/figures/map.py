@@ -21,6 +21,8 @@ from slamreplay.report.figures import canvas
 from slamreplay.report.figures.canvas import APPEARED, BLUE, FAINT, INK, REMOVED, VERMILLION
 
 _MARGIN_M = 2.5
+#: So many regions, the largest, bear their number; the others' would hide the map.
+_NAMED = 6
 
 
 def map_figure(post: Postmortem, width_in: float) -> Figure | None:
@@ -235,7 +237,7 @@ def _draw_regions(axes: Axes, post: Postmortem, size: float) -> None:
                 arrowprops={"arrowstyle": "->", "color": INK, "linewidth": 1.0},
                 zorder=5,
             )
-        if number <= 12:
+        if number <= _NAMED:
             axes.annotate(
                 f"R{number}",
                 (x1 + 0.1, y1 + 0.1),
