@@ -23,11 +23,14 @@ class Registry:
     def __init__(self, kind: str, builtin: Mapping[str, str]) -> None:
         self.kind = kind
         self._builtin = dict(builtin)
+        self._targets: dict[str, str] | None = None
 
     def targets(self) -> dict[str, str]:
         """Every name with the "module:attribute" it is loaded from, sorted; ours win."""
-        found = {e.name: e.value for e in entry_points(group=f"slamreplay.{self.kind}s")}
-        return dict(sorted({**found, **self._builtin}.items()))
+        if self._targets is None:  # entry points are read from every installed package's files
+            found = {e.name: e.value for e in entry_points(group=f"slamreplay.{self.kind}s")}
+            self._targets = dict(sorted({**found, **self._builtin}.items()))
+        return self._targets
 
     def __iter__(self) -> Iterator[str]:
         return iter(self.targets())

@@ -72,8 +72,9 @@ def _grid(title: str, *columns: str) -> Table:
     for column in columns:
         right = column in ("messages", "Hz", "count", "rows", "median s", "p95 s")
         name = column in ("role", "topic", "table", "what")
-        justify = "right" if right else "left"
-        table.add_column(column, justify=justify, overflow="fold", no_wrap=name)
+        table.add_column(
+            column, justify="right" if right else "left", overflow="fold", no_wrap=name
+        )
     return table
 
 

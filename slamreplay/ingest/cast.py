@@ -9,7 +9,7 @@ from slamreplay.bundle.manifest import Frames, Loss
 from slamreplay.bundle.view import ROLE_TABLES
 from slamreplay.errors import UsageError
 from slamreplay.ingest import roles
-from slamreplay.ingest.frames import find_frames, settle, without_frame
+from slamreplay.ingest.frames import direct_pose, find_frames, settle, without_frame
 from slamreplay.ingest.leaks import repeated_reference
 from slamreplay.ingest.names import is_map_frame, is_reference, tokens
 from slamreplay.ingest.roles import Choice
@@ -81,9 +81,12 @@ def settle_cast(topics: Sequence[TopicRows], overrides: Mapping[str, str]) -> Ca
         "points": roles.choose_simple(free("points"), "points", "point cloud", ("points",)),
         "plan": roles.choose_simple(free("plan"), "plans", "nav_msgs/Path", ("plan", "path")),
         "command": roles.choose_command(free("command")),
-        "recovery": roles.choose_simple(free("recovery"), "recoveries", "recovery actions", ()),
+        "recovery": roles.choose_recovery(free("recovery")),
     }
     found |= given
+    if found["pose"] is None and (direct := direct_pose(tf_rows, frames)) is not None:
+        others.append(direct)
+        found["pose"] = Choice(direct, f"tf {frames.map} -> {frames.base}, without an odom between")
     pose = found["pose"]
     if "covariance" not in found and pose is not None and roles.has_covariance(pose.rows):
         found["covariance"] = Choice(pose.rows, "the pose's own")

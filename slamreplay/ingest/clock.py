@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from slamreplay.bundle.manifest import Clock, Loss
 from slamreplay.geometry.times import NO_STAMP, NS_PER_S, Times
+from slamreplay.ingest.names import is_reference
 from slamreplay.ingest.rows import TopicRows
 
 #: Streams whose stamps come from a sensor's driver, in the order of trust.
@@ -31,6 +32,8 @@ def choose_clock(topics: Sequence[TopicRows]) -> Clock:
     problems: list[str] = []
     sound = []
     for topic in topics:
+        if is_reference(topic.topic):  # it only judges: nothing may hang on its being there
+            continue
         if topic.table in (*SENSOR_TABLES, *OTHER_TABLES) and len(topic) and not _static(topic):
             problem = _problem(topic)
             if problem is None:

@@ -73,17 +73,14 @@ def find_frames(
     """
     moving = [e for e in tree if not e.is_static]
     known = {f for e in tree for f in (e.parent, e.child)}
-    odom = given.get("odom_frame")
-    base = given.get("base_frame")
-    if odom is None and odometry is not None:
-        odom = odometry.frame() or None
-    if base is None and odometry is not None:
-        base = odometry.frame("child_frame_id") or None
-    if odom is None:
-        odom = _best([f for f in known if is_odom_frame(f)])
-    if base is None:
-        below = [e.child for e in moving if e.parent == odom and is_base_frame(e.child)]
-        base = _best(below) or _best([f for f in known if is_base_frame(f)])
+    said_odom = (odometry.frame() or None) if odometry is not None else None
+    said_base = (odometry.frame("child_frame_id") or None) if odometry is not None else None
+    # Drivers may name frames that are not on tf ("wheel_odom"): what hangs together goes first.
+    odom = given.get("odom_frame") or (said_odom if said_odom in known else None)
+    odom = odom or _best([f for f in known if is_odom_frame(f)]) or said_odom
+    base = given.get("base_frame") or (said_base if said_base in known else None)
+    below = [e.child for e in moving if e.parent == odom and is_base_frame(e.child)]
+    base = base or _best(below) or _best([f for f in known if is_base_frame(f)]) or said_base
     if odom is None and base is not None:  # no frame called odom: who moves the base
         parents = [e.parent for e in moving if e.child == base and not is_map_frame(e.parent)]
         odom = parents[0] if parents else None
@@ -113,6 +110,27 @@ def without_frame(
     reason = f"repeats the reference {reference}, which only judges"
     loss = Loss(kind="skipped", what=f"tf frame {frame}", count=count, reason=reason)
     return frames.model_copy(update={"tree": tree}), kept, loss
+
+
+def direct_pose(topics: Sequence[TopicRows], frames: Frames) -> TopicRows | None:
+    """Rows of table poses from a tf edge map -> base, as SLAM without an odom publishes it."""
+    for topic in topics:
+        columns = topic.columns
+        mine = (columns["parent_frame"] == frames.map) & (columns["child_frame"] == frames.base)
+        index = np.flatnonzero(mine & ~columns["is_static"])
+        if len(index):
+            rows = topic.take(index)
+            n = len(index)
+            poses = {
+                "frame_id": rows.columns["parent_frame"],
+                "child_frame_id": rows.columns["child_frame"],
+                "source": np.full(n, "tf", dtype=object),
+                "position_xyz": rows.columns["translation_xyz"],
+                "orientation_xyzw": rows.columns["rotation_xyzw"],
+                "covariance": np.full((n, 36), np.nan),
+            }
+            return replace(rows, table="poses", columns=poses, messages=n)
+    return None
 
 
 def _best(frames: Sequence[str]) -> str | None:
@@ -191,7 +209,7 @@ def _cycles(edges: Mapping[Pair, _Edge]) -> dict[Pair, str]:
             continue
         ring = line[line.index(above) :]
         pairs = [(parent_of[f], f) for f in ring]
-        thinnest = min(pairs, key=lambda p: (edges[p].samples, p))
+        thinnest = min(pairs, key=lambda p: (edges[p].is_static, edges[p].samples, p))
         dropped[thinnest] = f"closes a cycle: {' -> '.join([*ring, ring[0]])}"
         del parent_of[thinnest[1]]
     return dropped

@@ -19,7 +19,7 @@ from slamreplay.ingest.overrides import check_topics, read_overrides
 from slamreplay.ingest.parts import missing_parts
 from slamreplay.ingest.readers.open_log import open_log
 from slamreplay.ingest.reference_file import read_reference
-from slamreplay.ingest.robots import topic_filter
+from slamreplay.ingest.robots import refuse_mixture, topic_filter
 from slamreplay.ingest.roles import Choice
 from slamreplay.ingest.rows import TopicRows, read_rows
 from slamreplay.ingest.span import clock_between, cut, evidence_span
@@ -51,7 +51,10 @@ def ingest(
     overrides = read_overrides(options.topics)
     with open_log(logs) as (readers, losses):
         sources = [s for reader in readers for s in reader.sources]
-        names = [c.topic for reader in readers for c in reader.connections]
+        connections = [c for reader in readers for c in reader.connections]
+        names = [c.topic for c in connections]
+        if options.robot is None and not overrides:
+            refuse_mixture(connections)
         topics, lost = read_rows(readers, topic_filter(names, options.robot), progress)
     if options.robot is not None:
         topics = [without_prefix(t, options.robot.strip("/")) for t in topics]
@@ -75,7 +78,7 @@ def ingest(
         layers.choices["reference"] = Choice(rows, "given with --reference")
 
     tables = build(timed)
-    span = evidence_span(tables, cast.frames, logs[0])
+    span = evidence_span(tables, cast.frames, logs[0], losses)
     tables, span = cut(tables, span, options.start_s, options.end_s)
     if progress is not None:
         progress("writing", 1.0)

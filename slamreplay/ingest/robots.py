@@ -6,6 +6,24 @@ from collections.abc import Callable, Sequence
 
 from slamreplay.errors import UsageError
 from slamreplay.ingest.names import namespace
+from slamreplay.ingest.readers.reader import Connection
+
+
+def refuse_mixture(connections: Sequence[Connection]) -> None:
+    """Raise UsageError where several namespaces have both an odometry and a laser of their own.
+
+    A robot's two lasers may well be called /front/scan and /rear/scan: one of both is not enough.
+    """
+    spaces: dict[str, set[str]] = {}
+    for connection in connections:
+        if connection.type in ("nav_msgs/msg/Odometry", "sensor_msgs/msg/LaserScan"):
+            spaces.setdefault(namespace(connection.topic), set()).add(connection.type)
+    robots = sorted(name for name, types in spaces.items() if name and len(types) == 2)
+    if len(robots) > 1:
+        raise UsageError(
+            f"the log holds {len(robots)} robots: {', '.join(robots)}",
+            hint=f"choose one, as in --robot {robots[0]}",
+        )
 
 
 def topic_filter(topics: Sequence[str], robot: str | None) -> Callable[[str], str | None]:

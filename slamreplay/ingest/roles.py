@@ -162,6 +162,12 @@ def choose_simple(
     return _pick(found, rank, what, "by name, then most messages")
 
 
+def choose_recovery(topics: Sequence[TopicRows]) -> Choice | None:
+    """Where recoveries would be told of; none having happened is an answer too."""
+    found = [t for t in topics if t.table == "recoveries"]
+    return _pick(found, lambda t: (len(t), t.messages), "recovery actions", "most of them")
+
+
 def choose_command(topics: Sequence[TopicRows]) -> Choice | None:
     """What the base was told; a stamped twist without such a name may be a measurement."""
     named = {"cmd", "command"}

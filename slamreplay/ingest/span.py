@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from slamreplay.bundle.manifest import Clock, Frames
+from slamreplay.bundle.manifest import Clock, Frames, Loss
 from slamreplay.bundle.tables import Table
 from slamreplay.errors import LogError, UsageError
 from slamreplay.geometry.times import ns
@@ -17,7 +17,9 @@ from slamreplay.geometry.times import ns
 _HOLDING = ("transforms", "poses", "initial_poses", "map_updates")
 
 
-def evidence_span(tables: Mapping[str, Table], frames: Frames, log: Path) -> tuple[int, int]:
+def evidence_span(
+    tables: Mapping[str, Table], frames: Frames, log: Path, losses: Sequence[Loss]
+) -> tuple[int, int]:
     """First and last time of the evidence; a latched message of the day before does not count.
 
     Raises:
@@ -30,6 +32,9 @@ def evidence_span(tables: Mapping[str, Table], frames: Frames, log: Path) -> tup
     if not times and _rows(tables, "poses") and _rows(tables, "references"):
         times = [tables["poses"].t_ns, tables["references"].t_ns]
     if not times:
+        broken = next((loss.reason for loss in losses if loss.kind == "lost"), None)
+        if broken is not None:
+            raise LogError(f"no scan and no odometry could be read: {broken}", where=log)
         raise LogError(
             "no scan and no odometry in it: nothing to work with",
             where=log,

@@ -61,9 +61,11 @@ def _shipped(encoding: str) -> Typestore:
     from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
     store = get_typestore(Stores.ROS1_NOETIC if encoding == "ros1" else Stores.ROS2_HUMBLE)
-    missing = {name: text for name, text in DEFINITIONS.items() if name not in store.fielddefs}
-    for name, text in missing.items():
-        store.register(get_types_from_msg(text, name))
+    missing: Typesdict = {}
+    for name, text in DEFINITIONS.items():
+        if name not in store.fielddefs:
+            missing |= get_types_from_msg(text, name)
+    store.register(missing)
     return store
 
 
