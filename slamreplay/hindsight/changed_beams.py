@@ -80,7 +80,7 @@ def _classify(  # type: ignore[no-untyped-def]  # noqa: C901
             if length <= 0.0:
                 continue
             dx, dy = dx / length, dy / length
-            wall = _to_wall(cells, ox, oy, dx, dy, length + beyond, beyond)
+            wall = to_wall(cells, ox, oy, dx, dy, length + beyond, beyond)
             if wall < 0.0:
                 continue
             if kind[s, b] == HIT and wall > length + beyond:
@@ -95,19 +95,23 @@ def _classify(  # type: ignore[no-untyped-def]  # noqa: C901
                 # Only a beam whose neighbours to both sides should have been stopped as well.
                 angle = 0.01 + 0.08 / (wall * cell + 0.1)
                 ca, sa = np.cos(angle), np.sin(angle)
+                # A wall met at more than 70 degrees from its normal sends too little back for
+                # "no return" to mean that it is gone.
+                slant = 2.75 * angle * wall if kind[s, b] != HIT else np.inf
                 stopped = True
                 for k in range(2):
                     tilt = sa if k else -sa
-                    side = _to_wall(
+                    side = to_wall(
                         cells, ox, oy, ca * dx - tilt * dy, tilt * dx + ca * dy, length, beyond
                     )
                     stopped = stopped and side >= 0.0 and side + beyond < length
+                    stopped = stopped and abs(side - wall) <= slant + 1.0
                 if stopped:
                     change[s, b], where[s, b] = REMOVED, row * width + col
 
 
 @njit(cache=True)
-def _to_wall(cells, x, y, dx, dy, limit, seam):  # type: ignore[no-untyped-def]
+def to_wall(cells, x, y, dx, dy, limit, seam):  # type: ignore[no-untyped-def]
     """Distance in cells to the first wall, inf where none is within `limit`, -1 if unmapped first.
 
     A mapper leaves thin unmapped seams before walls: one thinner than `seam` does not count. Beyond

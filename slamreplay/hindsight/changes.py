@@ -19,6 +19,7 @@ from slamreplay.hindsight.changed_beams import (
     changed_beams,
 )
 from slamreplay.hindsight.evidence import Evidence, gather
+from slamreplay.hindsight.reach import with_proven_reach
 from slamreplay.maps.grid import OccupancyGrid
 from slamreplay.matching.field import WorkingMap
 
@@ -44,8 +45,12 @@ def find_changes(
         poses: (N, 3) of the base in the grid's frame, NaN where there is none.
     """
     poses = np.ascontiguousarray(poses)
+    mapped = WALL * working.walls.astype(np.uint8) | UNKNOWN * working.unknown.astype(np.uint8)
+    beams = with_proven_reach(
+        mapped, working.resolution_m, working.corner_xy, beams, poses, BEYOND_M
+    )
     evidence = gather(working, beams, poses)
-    cells = _cell_bits(working, evidence)
+    cells = mapped | _structure_bits(working, evidence)
     change, where = changed_beams(
         cells, working.resolution_m, working.corner_xy, beams, poses, BEYOND_M
     )
@@ -56,7 +61,10 @@ def find_changes(
     appeared = _mask(cells, where[change == APPEARED])
     passed = _fine(working, evidence.pass_s >= GONE_S, evidence.step)
     removed = _mask(cells, where[change == REMOVED])
-    removed |= working.walls & passed & ((cells & SUPPORTED) == 0)
+    # What lies behind the first cell of a wall went with it.
+    reach = 2 * round(BEYOND_M / working.resolution_m) + 1
+    with_it = binary_dilation(removed, np.ones((reach, reach), dtype=bool))
+    removed |= with_it & working.walls & passed & ((cells & SUPPORTED) == 0)
     regions = [
         region
         for kind, code, mask in (("appeared", APPEARED, appeared), ("removed", REMOVED, removed))
@@ -74,8 +82,8 @@ def find_changes(
     )
 
 
-def _cell_bits(working: WorkingMap, evidence: Evidence) -> NDArray[np.uint8]:
-    """(H, W) what the map and the evidence say of each cell."""
+def _structure_bits(working: WorkingMap, evidence: Evidence) -> NDArray[np.uint8]:
+    """(H, W) what stands where, from what was seen and seen through."""
     hit_s, pass_s = evidence.hit_s, evidence.pass_s
     standing = (hit_s >= STANDING_S) & (pass_s <= PASSES_PER_HIT * hit_s)
     near = binary_dilation(standing, np.ones((3, 3), dtype=bool))
@@ -86,7 +94,6 @@ def _cell_bits(working: WorkingMap, evidence: Evidence) -> NDArray[np.uint8]:
     seen = _fine(working, seen, evidence.step)
     seen_m = distance_transform_edt(~seen) * working.resolution_m if seen.any() else np.inf
     bits = np.zeros(working.walls.shape, dtype=np.uint8)
-    bits |= WALL * working.walls.astype(np.uint8) | UNKNOWN * working.unknown.astype(np.uint8)
     bits |= NEW * (_fine(working, near, evidence.step) & (apart_m > BEYOND_M)).astype(np.uint8)
     bits |= SUPPORTED * np.broadcast_to(seen_m <= BEYOND_M, bits.shape).astype(np.uint8)
     return bits

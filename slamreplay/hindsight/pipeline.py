@@ -30,13 +30,12 @@ from slamreplay.hindsight.places import (
 from slamreplay.hindsight.search import hypotheses_of
 from slamreplay.hindsight.seating import seat_keyframes
 from slamreplay.hindsight.smoothing import smooth
-from slamreplay.hindsight.submaps import Submap, owners, submaps
+from slamreplay.hindsight.submaps import Submap, submaps
+from slamreplay.hindsight.trust import trusted_keyframes
 from slamreplay.matching.field import WorkingMap, working_map
 from slamreplay.matching.whole_map import search_space
 
 SIGMA_M = 0.12
-#: Under this mean score of a submap the map does not hold the place the robot was at.
-MIN_PLACE_SCORE = 0.3
 
 Progress = Callable[[str, float], None]
 
@@ -84,8 +83,8 @@ def hindsight(view: BundleView, *, progress: Progress | None = None) -> Hindsigh
     say("pose graph", 0.7)
     poses, cov = smooth(field, points, start, chain, is_open)
     say("every scan", 0.8)
-    owner = owners(found, len(keys))
-    trusted = (owner >= 0) & (places.score[owner] >= MIN_PLACE_SCORE)
+    key_beams = Beams(beams.t_ns[keys], beams.ends[keys], beams.kind[keys], beams.laser_xy)
+    trusted = trusted_keyframes(places, chain, is_open, cov, scan_scores(field, key_beams, poses))
     carried, share = carry(odometry, keys, poses, is_open, beams, field)
     carried, scan_cov = settle(carried, cov[share], odometry, keys[share], beams, field)
     carried[~trusted[share]], scan_cov[~trusted[share]] = np.nan, np.nan

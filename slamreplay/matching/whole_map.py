@@ -79,7 +79,7 @@ def search_map(
         return np.empty((0, 3)), np.empty(0)
     if len(points) > MAX_POINTS:
         points = points[np.linspace(0, len(points) - 1, MAX_POINTS).astype(np.int64)]
-    starts = _coarse_peaks(space, points, 2 * count, heading_step_rad)
+    starts = _coarse_peaks(space, points, count + count // 2, heading_step_rad)
     # The lattice leaves half a cell and half a heading step to either side.
     half = space.cell_m / 2.0
     window = Window(half, half / 2.0, heading_step_rad / 2.0, heading_step_rad / 2.0)
