@@ -1,5 +1,6 @@
 """A log becomes a bundle: roles, frames, clock, map, losses; bad input gives one line."""
 
+import contextlib
 import json
 
 import numpy as np
@@ -8,7 +9,7 @@ import yaml
 
 from slamreplay.bundle.belief import recorded_belief
 from slamreplay.bundle.format_page import format_page
-from slamreplay.errors import LogError, MapError, OutputError, UsageError
+from slamreplay.errors import LogError, MapError, OutputError, SlamreplayError, UsageError
 from slamreplay.ingest.audit import inspect
 from slamreplay.ingest.options import IngestOptions
 from slamreplay.ingest.pipeline import ingest
@@ -501,6 +502,21 @@ def test_broken_messages_and_unknown_types_are_counted(logs, robot, tmp_path):
     assert [c for (k, w, _), c in found.items() if (k, w) == ("lost", "/scan")] == [1]
 
 
+def test_a_type_that_a_log_defines_differently_is_lost_with_a_reason(logs, robot, tmp_path):
+    from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+    store = get_typestore(Stores.EMPTY)
+    store.register(get_types_from_msg("float64 yaw", IMU))
+    logs.stores[3] = store
+    odd = logs.write("odd.mcap", [("/imu", IMU, logs.make(IMU, 3, yaw=1.0), EPOCH)], ros=3)
+
+    bundle = ingest([odd, logs.write("log.mcap", robot.messages())], tmp_path / "b")
+
+    (lost,) = [entry for entry in bundle.manifest.losses if entry.kind == "lost"]
+    assert (lost.what, lost.count) == ("/imu", 1)
+    assert "its definition is another one" in lost.reason
+
+
 def text_as_bag(tmp_path, logs, robot):
     (tmp_path / "a.bag").write_text("these are my notes\n")
     return [tmp_path / "a.bag"], IngestOptions()
@@ -594,6 +610,21 @@ def test_a_cut_log_is_read_up_to_the_cut_or_refused_in_one_line(logs, tmp_path, 
     assert 0 < len(bundle.table("scans")) < 400
     (lost,) = [entry for entry in bundle.manifest.losses if entry.kind == "lost"]
     assert "broken" in lost.reason
+
+
+@pytest.mark.parametrize("name", ["log.mcap", "one.bag", "log.db3"])
+def test_flipped_bytes_never_give_a_traceback(logs, tmp_path, name):
+    ros = 1 if name.endswith(".bag") else 2
+    path = logs.write(name, Robot(logs, steps=3, ros=ros).messages(), ros=ros)
+    whole = path.read_bytes()
+    rng = np.random.default_rng(7)
+    for _ in range(12):
+        damaged = bytearray(whole)
+        for position in rng.integers(len(whole), size=5):
+            damaged[position] ^= 1 << rng.integers(8)
+        path.write_bytes(damaged)
+        with contextlib.suppress(SlamreplayError):
+            ingest([path], tmp_path / "b")
 
 
 def test_inspect_answers_for_everything(logs, robot, tmp_path):

@@ -170,7 +170,11 @@ class _Batch:
         self._payloads, self._times, self._bytes = [], [], 0
         if not items:
             return
-        decoded = self._decoder.decode(Messages(items, t_log))
+        try:
+            decoded = self._decoder.decode(Messages(items, t_log))
+        except AttributeError as error:  # a log may define a type of this name differently
+            self._broken += [f"its definition is another one: {error}"] * len(items)
+            return
         for remark in decoded.remarks:
             if remark.count:
                 key = (remark.kind, remark.reason)

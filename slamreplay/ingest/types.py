@@ -44,15 +44,16 @@ def _store(encoding: str, name: str, form: str, text: str) -> Typestore:
             raise LogError("the log has no definition of this type, and neither do we")
         return store
     store = get_typestore(Stores.EMPTY)
+    shipped = _shipped(encoding).fielddefs
     try:
         found = get_types_from_idl(text) if form == "idl" else get_types_from_msg(text, name)
+        while missing := sorted(_needed(found) & set(shipped) - set(found)):
+            # Recorders leave out builtin_interfaces, and odd bags even std_msgs/Header.
+            found |= {t: shipped[t] for t in missing}
+        store.register(found)
+        store.get_msgdef(name)
     except Exception as error:  # a parser of foreign text fails in many ways
         raise LogError(f"its definition cannot be read: {str(error).splitlines()[0]}") from error
-    shipped = _shipped(encoding).fielddefs
-    while missing := sorted(_needed(found) & set(shipped) - set(found)):
-        # Recorders leave out builtin_interfaces, and odd bags even std_msgs/Header.
-        found |= {t: shipped[t] for t in missing}
-    store.register(found)
     return store
 
 

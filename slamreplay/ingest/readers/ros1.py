@@ -61,7 +61,7 @@ class Ros1Reader:
             if header[b"op"][0] != _CHUNK:
                 continue
             for inner, payload in self._chunk(header, data):
-                if inner.get(b"op") != bytes([_MESSAGE]):
+                if inner[b"op"][0] != _MESSAGE:
                     continue
                 index = self._ids.get(_u32(inner[b"conn"]))
                 if index is not None and index in wanted:
@@ -86,9 +86,9 @@ class Ros1Reader:
         for header, data in self._records():
             records = self._chunk(header, data) if header[b"op"][0] == _CHUNK else ()
             for inner, payload in records:
-                if inner.get(b"op") == bytes([_CONNECTION]):
+                if inner[b"op"][0] == _CONNECTION:
                     self._learn(inner, payload)
-                elif inner.get(b"op") == bytes([_MESSAGE]):
+                elif inner[b"op"][0] == _MESSAGE:
                     counts[self._ids.get(_u32(inner[b"conn"]), -1)] += 1
         return counts
 
@@ -112,8 +112,7 @@ class Ros1Reader:
                 try:
                     header = _fields(_block(stream.read(4), stream, size))
                     data = _block(stream.read(4), stream, size)
-                    if len(header.get(b"op", b"")) != 1:
-                        raise ValueError("record without op")  # noqa: TRY301
+                    _check(header)
                 except (ValueError, struct.error) as error:
                     reason = f"broken at byte {position}: {error}"
                     what = f"{self._path.name}: bytes"
@@ -133,7 +132,9 @@ class Ros1Reader:
             while at < len(raw):
                 fields, at = _slice(raw, at)
                 payload, at = _slice(raw, at)
-                records.append((_fields(fields), payload))
+                record = _fields(fields)
+                _check(record)
+                records.append((record, payload))
         except (ValueError, OSError, RuntimeError, EOFError, struct.error) as error:
             reason = f"damaged chunk ({compression}): {error}"
             what = f"{self._path.name}: chunks"
@@ -179,6 +180,20 @@ def _fields(data: bytes) -> _Header:
             raise ValueError("a header field without '='")
         out[name] = value
     return out
+
+
+def _check(header: _Header) -> None:
+    """Raise ValueError where a record lacks the fields that its kind is read by."""
+    op = header.get(b"op", b"")
+    sizes = {b"op": 1}
+    if op == bytes([_MESSAGE]):
+        sizes |= {b"conn": 4, b"time": 8}
+    elif op == bytes([_INDEX]):
+        sizes |= {b"conn": 4, b"count": 4}
+    elif op == bytes([_CONNECTION]):
+        sizes |= {b"conn": 4}
+    if any(len(header.get(name, b"")) != size for name, size in sizes.items()):
+        raise ValueError("a record lacks fields")
 
 
 def _u32(data: bytes) -> int:
