@@ -78,6 +78,7 @@ class Page:
     course_alt: str
     covariance_alt: str
     reference_note: str
+    trials_note: str
 
 
 def page(post: Postmortem) -> Page:
@@ -133,6 +134,7 @@ def page(post: Postmortem) -> Page:
         course_alt=phrases.course_alt(post),
         covariance_alt=phrases.covariance_alt(post),
         reference_note=phrases.reference_note(post),
+        trials_note=phrases.trials_note(post),
     )
 
 

@@ -88,6 +88,13 @@ def covariance_alt(post: Postmortem) -> str:
     )
 
 
+def trials_note(post: Postmortem) -> str:
+    """What the trials' errors are measured against."""
+    if any(t.metrics.get("reference_rmse_m") is not None for t in post.trials):
+        return "Errors are distances to the log's own reference, nothing aligned."
+    return "Errors are distances to hindsight, nothing aligned."
+
+
 def reference_note(post: Postmortem) -> str:
     """What the covariance was measured against."""
     if post.reference_kind is None:

@@ -17,12 +17,12 @@ MOST_ROWS = 40
 
 #: The metrics that have a column on the page, as it calls them; report.json has them all.
 _COLUMNS = {
-    "reference_rmse_m": "off the reference, rms [m]",
-    "reference_max_m": "at most [m]",
-    "hindsight_rmse_m": "off hindsight, rms [m]",
-    "hindsight_max_m": "at most [m]",
+    "reference_rmse_m": "rms error [m]",
+    "reference_max_m": "max error [m]",
+    "hindsight_rmse_m": "rms error [m]",
+    "hindsight_max_m": "max error [m]",
     "lost_share": "share lost [1]",
-    "baseline_max_m": "off its baseline, at most [m]",
+    "baseline_max_m": "from baseline [m]",
     "nees_mean": "mean NEES [1]",
 }
 
@@ -143,13 +143,19 @@ def regions(post: Postmortem) -> Table:
 def trials(post: Postmortem) -> Table:
     """A row per trial, a column per metric; each perturbed number stands beside its baseline."""
     names = [name for name in _COLUMNS if any(t.metrics.get(name) is not None for t in post.trials)]
+    if "reference_rmse_m" in names:  # hindsight stands in for it where the log has none
+        names = [name for name in names if not name.startswith("hindsight_")]
+    order = list(dict.fromkeys(t.run.trial.estimator for t in post.trials))
     baselines = {
-        t.run.trial.estimator: t.metrics for t in post.trials if t.run.trial.perturbation is None
+        (t.run.trial.estimator, t.run.trial.seed): t.metrics
+        for t in post.trials
+        if t.run.trial.perturbation is None
     }
     rows: list[list[str | Cell]] = []
-    for result in post.trials:
+    for result in sorted(post.trials, key=lambda t: order.index(t.run.trial.estimator)):
         trial = result.run.trial
-        base = {} if trial.perturbation is None else baselines.get(trial.estimator, {})
+        undisturbed = baselines.get((trial.estimator, trial.seed), {})
+        base = {} if trial.perturbation is None else undisturbed
         cells: list[str | Cell] = [
             trial.estimator,
             trial.perturbation or "baseline",
