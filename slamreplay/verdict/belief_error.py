@@ -110,13 +110,6 @@ def explained_match(hindsight: Hindsight) -> se2.Array:
     return np.asarray(np.minimum(match / (1.0 - share), 1.0))
 
 
-def fits_nowhere(hindsight: Hindsight, limits: Limits) -> bool:
-    """Whether the map explains too little of the log, wherever the robot is put."""
-    explained = explained_match(hindsight)[hindsight.track.has_pose]
-    explained = explained[np.isfinite(explained)]
-    return not len(explained) or float(np.median(explained)) < limits.fits_from
-
-
 def _from_first(belief: PoseTrack, t_ns: NDArray[np.int64]) -> NDArray[np.bool_]:
     times = belief.t_ns[belief.has_pose]
     return t_ns >= times.min() if len(times) else np.zeros(len(t_ns), dtype=bool)

@@ -12,9 +12,9 @@ from slamreplay.bundle.products import Hindsight
 from slamreplay.bundle.track import PoseTrack
 from slamreplay.bundle.view import BundleView
 from slamreplay.geometry.times import NS_PER_S
-from slamreplay.verdict.belief_error import explained_match
 from slamreplay.verdict.judgement import Interval
 from slamreplay.verdict.limits import Limits
+from slamreplay.verdict.map_fit import MapFit
 from slamreplay.verdict.map_frame import ConstantOffset
 
 
@@ -25,6 +25,7 @@ def verdict_findings(
     intervals: Sequence[Interval],
     offset: ConstantOffset | None,
     limits: Limits,
+    fit: MapFit | None = None,
 ) -> tuple[Finding, ...]:
     """Worst first; within a severity in time order."""
     span = (view.manifest.start_ns, view.manifest.end_ns)
@@ -39,7 +40,7 @@ def verdict_findings(
     found += [_changed(e, hindsight, limits) for e in _episodes(intervals, lambda i: i.is_changed)]
     if hindsight is not None:
         found += _unobservable(intervals, hindsight, limits)
-        found += _wrong_map(intervals, hindsight, limits)
+    found += _wrong_map(fit, limits, span)
     found += _offset(offset, span)
     found += _unjudged(intervals, span)
     return tuple(sorted(found, key=lambda f: (-SEVERITIES.index(f.severity), f.start_ns or 0)))
@@ -130,28 +131,20 @@ def _unobservable(
     ]
 
 
-def _wrong_map(
-    intervals: Sequence[Interval], hindsight: Hindsight, limits: Limits
-) -> list[Finding]:
-    if not any("SR-MAP-WRONG" in i.findings for i in intervals):
+def _wrong_map(fit: MapFit | None, limits: Limits, span: tuple[int, int]) -> list[Finding]:
+    if fit is None or fit.fits:
         return []
-    match = explained_match(hindsight)
-    match = match[np.isfinite(match)]
-    typical = float(np.median(match)) if len(match) else None
-    score = "no scan has a place" if typical is None else f"a typical scan scores {typical:.2f}"
-    text = f"the scans fit nowhere in this map: {score} where {limits.fits_from:.2f} is needed"
+    text = f"the scans fit nowhere in this map: {fit.text}"
     return [
         Finding(
             "SR-MAP-WRONG",
             "error",
             text,
-            intervals[0].start_ns,
-            intervals[-1].end_ns,
-            value=typical,
-            low=limits.fits_from,
+            *span,
+            value=fit.typical,
+            low=limits.fits_well_from,
             high=1.0,
             unit="1",
-            n=len(match),
         )
     ]
 

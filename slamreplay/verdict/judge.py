@@ -11,12 +11,12 @@ from slamreplay.bundle.products import Hindsight
 from slamreplay.bundle.track import PoseTrack
 from slamreplay.bundle.view import BundleView
 from slamreplay.verdict.actions import actions, risky
-from slamreplay.verdict.belief_error import fits_nowhere
 from slamreplay.verdict.failure_mode import failure_mode
 from slamreplay.verdict.findings import verdict_findings
 from slamreplay.verdict.intervals import log_state
 from slamreplay.verdict.judgement import FailureMode, Interval, Judgement, State
 from slamreplay.verdict.limits import Limits
+from slamreplay.verdict.map_fit import MapFit, map_fit
 from slamreplay.verdict.stops import stop_findings, stops
 from slamreplay.verdict.summary import summary
 from slamreplay.verdict.tiles import Evidence, gathered, intervals_of
@@ -44,8 +44,11 @@ def judge(
     """
     if belief is not None and not belief.has_pose.any():
         belief = None
-    if hindsight is None or not len(hindsight.track) or fits_nowhere(hindsight, limits):
+    if hindsight is None or not len(hindsight.track):
         return _unjudged(view, belief, hindsight, limits)
+    fit = map_fit(view, hindsight, limits)
+    if not fit.fits:
+        return _unjudged(view, belief, hindsight, limits, fit=fit)
     if hindsight.margin is not None and hindsight.margin < limits.margin:
         return _unjudged(view, belief, hindsight, limits, ambiguous=True)
     evidence = gathered(view, belief, hindsight, limits)
@@ -129,6 +132,7 @@ def _unjudged(
     hindsight: Hindsight | None,
     limits: Limits,
     *,
+    fit: MapFit | None = None,
     ambiguous: bool = False,
 ) -> Judgement:
     """A log of which nothing can be said, as one interval; what the robot did still stands."""
@@ -142,14 +146,14 @@ def _unjudged(
             ids, reason = ("SR-MAP-002",), "there is no map to compare with"
         elif hindsight is None:
             reason = "there are no scans to compare with the map"
-        elif len(hindsight.track):
+        elif fit is not None:
             ids, reason = ("SR-MAP-WRONG",), "its scans fit nowhere in this map"
             words = ("no place in the map explains the scans: another floor, scale or building",)
             mode = FailureMode("wrong_map", 0.7, words)
     else:
         mode = FailureMode("sensing_ambiguity", 0.7, ("two places explain all scans equally well",))
     start = view.manifest.start_ns
-    whole = (Interval(state, start, max(view.manifest.end_ns, start + 1), findings=ids),)
+    whole = (Interval(state, start, view.manifest.end_ns, findings=ids),)
     found_stops = stops(view, belief, None, whole)
     done = actions(view, belief, limits)
     text = summary(
@@ -164,7 +168,7 @@ def _unjudged(
         reason=reason,
     )
     findings: tuple[Finding, ...] = (
-        *verdict_findings(view, belief, hindsight, whole, None, limits),
+        *verdict_findings(view, belief, hindsight, whole, None, limits, fit),
         *risky(done),
         *stop_findings(found_stops, start),
     )

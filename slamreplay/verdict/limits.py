@@ -20,8 +20,12 @@ class Limits:
         total_s: lost (or changed) for this long in all makes the log a lost (or changed) one.
         margin: hindsight whose best sequence of places beats the best different one by less than
             this mean score per scan cannot tell them apart.
-        fits_from: mean score (0 to 1) from which on a scan counts as explained by the map; a log
-            whose typical scan stays below it fits nowhere.
+        fits_from: a log whose typical scan scores less (0 to 1) fits nowhere in the map.
+        fits_well_from: one that scores less than this fits only if the best sequence of places
+            beats the best different one by `clear_margin`.
+        clear_margin: mean score per scan; see `fits_well_from` and `disagreement`.
+        disagreement: without a clear margin, hindsight that moves otherwise than odometry at more
+            than this share of the moments does not fit either.
         match_ratio: a moment whose scan scores less than this part of the log's typical score,
             changed beams not counted against it, is not judged.
         frame_offset_m: a constant offset of belief against hindsight from here on is reported as
@@ -39,7 +43,10 @@ class Limits:
     bridge_s: float = 1.0
     total_s: float = 5.0
     margin: float = 0.01
-    fits_from: float = 0.4
+    fits_from: float = 0.35
+    fits_well_from: float = 0.7
+    clear_margin: float = 0.1
+    disagreement: float = 0.15
     match_ratio: float = 0.35
     frame_offset_m: float = 0.2
     frame_offset_rad: float = math.radians(3.0)

@@ -60,7 +60,7 @@ def stops(
         interval = _at(intervals, rest.start_ns)
         state: State = "insufficient_data" if interval is None else interval.state
         x, y = _place((where, belief), rest.start_ns)
-        cause = _cause(intervals, interval, rest, view.manifest.start_ns, reason)
+        cause = _cause(intervals, interval, view.manifest.start_ns, reason)
         found.append(Stop(rest.start_ns, x, y, state, cause))
     return tuple(found)
 
@@ -167,7 +167,7 @@ def _place(tracks: Sequence[PoseTrack | None], t_ns: int) -> tuple[float | None,
 
 
 def _cause(
-    intervals: Sequence[Interval], interval: Interval | None, rest: Span, start_ns: int, reason: str
+    intervals: Sequence[Interval], interval: Interval | None, start_ns: int, reason: str
 ) -> str:
     """What came first: being lost or the changed map, else what the log says of the stop itself."""
     if interval is None or not (interval.is_lost or interval.is_changed):

@@ -144,8 +144,10 @@ def _share(intervals: Sequence[Interval], changes: Changes | None, start_ns: int
 
 
 def _within(intervals: Sequence[Interval]) -> str:
-    errors = [i.max_error_m for i in intervals if i.max_error_m is not None]
-    return f" (to within {max(errors):.2f} m)" if errors else ""
+    errors = [i.max_error_m for i in intervals if i.max_error_m is not None and not i.is_lost]
+    lost = sum(i.duration_ns for i in intervals if i.is_lost) / NS_PER_S
+    text = f" (to within {max(errors):.2f} m)" if errors else ""
+    return f"{text} but for {lost:.1f} s" if lost else text
 
 
 def _stopped(stops: Sequence[Stop], start_ns: int) -> str:

@@ -53,7 +53,9 @@ def gathered(
 
 def intervals_of(view: BundleView, evidence: Evidence, limits: Limits) -> tuple[Interval, ...]:
     """The intervals that tile the log, with their numbers and the ids of their findings."""
-    span = (view.manifest.start_ns, max(view.manifest.end_ns, view.manifest.start_ns + 1))
+    span = (view.manifest.start_ns, view.manifest.end_ns)
+    if span[1] <= span[0]:
+        return (Interval("insufficient_data", *span, findings=("SR-LOC-004",)),)
     error, changes, bridge = evidence.error, evidence.changes, ns(limits.bridge_s)
     lost = held(error.t_ns, _lost_flags(error, limits), *span, bridge)
     changed_t, flags = _changed_flags(error, changes, limits)
