@@ -73,6 +73,8 @@ class NeesSummary:
         text = f"the sigma of {name} is too {too} by a factor of {factor:.2g}"
         if self.credibility == "consistent":
             text = f"the sigma of {name} fits its error (factor {self.ratio:.2g})"
+        if self.credibility == "insufficient":
+            text = f"undecided whether {text}"
         numbers = f"mean NEES {self.mean:.3g} where {self.dof} is expected"
         if self.low is not None and self.high is not None:
             numbers += f" and {self.low:.3g} to {self.high:.3g} would be chance"
