@@ -344,6 +344,11 @@ def test_junit_fails_on_errors_and_skips_what_could_not_be_asked(post, bare):
     assert cases["SR-DAT-002"].find("failure") is None
     assert "<script>" in cases["SR-DAT-002"].find("system-out").text
     assert not list(cases["SR-MAP-001"])
+    undecided = replace(post, findings=(Finding("SR-CON-003", "info", "too few updates"),))
+    cases = {
+        c.get("name").split()[0]: c for c in ET.fromstring(junit_xml(undecided)).iter("testcase")
+    }
+    assert cases["SR-CON-001"].find("skipped").get("message") == "too few updates"
     suite = ET.fromstring(junit_xml(bare)).find("testsuite")
     skipped = {c.get("name").split()[0] for c in suite if c.find("skipped") is not None}
     assert {"SR-LOC-001", "SR-MAP-001", "SR-CON-001"} <= skipped

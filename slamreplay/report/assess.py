@@ -21,6 +21,12 @@ def not_assessable(post: Postmortem) -> dict[str, str]:
     elif post.nees is None and "SR-CON-001" not in reasons:
         lacks = "no reference" if post.reference is None else "no covariance"
         reasons["SR-CON-001"] = f"{lacks} to measure the belief's errors against"
+    undecided = [f for f in post.findings if f.id == "SR-CON-003"]
+    if undecided:
+        reasons.setdefault("SR-CON-001", undecided[0].message)
+    if post.judgement.state in ("unobservable", "insufficient_data"):
+        for id_ in ("SR-LOC-001", "SR-MAP-001", "SR-MAP-FRAME"):
+            reasons.setdefault(id_, post.judgement.summary.rstrip("."))
     answered = {finding.id for finding in post.findings}
     return {id_: why for id_, why in reasons.items() if id_ not in answered}
 
