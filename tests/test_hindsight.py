@@ -1,11 +1,18 @@
 """The robot is found without its belief, and a changed room is told from a right one."""
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 
 from slamreplay.bundle.products import Hindsight
-from slamreplay.geometry import se2
+from slamreplay.bundle.tables import Ragged
+from slamreplay.bundle.view import BundleView
+from slamreplay.geometry import se2, se3
+from slamreplay.geometry.times import NS_PER_S
 from slamreplay.hindsight.pipeline import hindsight
+from slamreplay.ingest.options import IngestOptions
+from slamreplay.ingest.pipeline import ingest
 from slamreplay.maps.grid import OccupancyGrid
 from slamreplay.testing.synthetic import room_grid, synthetic_bundle, true_path
 
@@ -74,3 +81,118 @@ def test_belief_is_not_read(healthy):
 
 def test_without_a_map_there_is_no_hindsight():
     assert hindsight(synthetic_bundle(seconds=2.0, with_map=False).view()) is None
+
+
+def with_scans(view: BundleView, change: Callable[[np.ndarray], np.ndarray]) -> BundleView:
+    scans = view.table("scans")
+    ranges = [change(scans["ranges_m"][i]) for i in range(len(scans))]
+    return view.with_table(scans.replace(ranges_m=Ragged.of(ranges, np.float32)))
+
+
+@pytest.mark.parametrize(
+    "change",
+    [lambda r: r[:0], lambda r: np.full_like(r, np.inf), lambda r: np.full_like(r, np.nan)],
+    ids=["empty", "no returns", "invalid"],
+)
+def test_scans_that_say_nothing_give_no_pose(change):
+    found = hindsight(with_scans(synthetic_bundle(seconds=3.0).view(), change))
+
+    assert found is not None
+    assert found.coverage == 0.0
+    assert len(found.track) == 30
+
+
+def test_robot_is_found_without_odometry():
+    view = synthetic_bundle(seconds=20.0).view()
+    tf = view.table("transforms")
+    view = view.with_table(view.table("odometry").take(np.arange(0)))
+    found = hindsight(view.with_table(tf.take(tf["child_frame"] != "base_link")))
+
+    assert found is not None
+    assert np.quantile(errors(found)[:, 0], 0.95) < 0.1
+
+
+def test_kidnapped_robot_is_found_on_both_sides():
+    view = synthetic_bundle(seconds=40.0).view()
+    scans, tf = view.table("scans"), view.table("transforms")
+    start = scans.t_ns[0]
+    gone = (scans.t_ns >= start + 15 * NS_PER_S) & (scans.t_ns < start + 25 * NS_PER_S)
+    # Odometry goes on after the gap as if nothing had happened in it.
+    moving = np.flatnonzero(tf["child_frame"] == "base_link")
+    t_s = (tf.t_ns[moving] - start) / NS_PER_S
+    before = moving[np.searchsorted(t_s, 15.0)]
+    after = moving[np.searchsorted(t_s, 25.0)]
+    xyyaw = np.column_stack(
+        [tf["translation_xyz"][:, :2], se3.yaw_from_quaternion(tf["rotation_xyzw"])]
+    )
+    late = moving[t_s >= 25.0]
+    carried = se2.compose(xyyaw[before], se2.between(xyyaw[after], xyyaw[late]))
+    translation, rotation = tf["translation_xyz"].copy(), tf["rotation_xyzw"].copy()
+    translation[late, :2] = carried[:, :2]
+    rotation[late] = se3.quaternion_from_yaw(carried[:, 2])
+    moved = tf.replace(translation_xyz=translation, rotation_xyzw=rotation)
+    stays = np.ones(len(tf), dtype=bool)
+    stays[moving[(t_s > 15.0) & (t_s < 25.0)]] = False
+
+    found = hindsight(view.with_table(scans.take(~gone)).with_table(moved.take(stays)))
+
+    assert found is not None
+    assert found.coverage > 0.95
+    assert np.nanquantile(errors(found)[:, 0], 0.95) < 0.15
+
+
+def test_two_like_places_leave_no_margin():
+    cells = room_grid().cells.copy()
+    symmetric = np.maximum(cells, cells[::-1, ::-1])
+    room = OccupancyGrid(symmetric, 0.05, room_grid().origin_xyyaw)
+    found = hindsight(synthetic_bundle(seconds=20.0, world=room).view().with_grid(room))
+
+    assert found is not None
+    assert found.margin is not None
+    assert found.margin < 0.02
+
+
+def test_foreign_map_gives_no_pose():
+    cells = np.zeros((300, 400), dtype=np.int8)
+    cells[[0, -1]] = cells[:, [0, -1]] = 100
+    for k in range(12):
+        cells[40 + 18 * k : 44 + 18 * k, 30 + 25 * k : 60 + 25 * k] = 100
+    foreign = OccupancyGrid(cells, 0.05, np.zeros(3))
+    found = hindsight(synthetic_bundle(seconds=40.0).view().with_grid(foreign))
+
+    assert found is not None
+    assert found.coverage == 0.0
+
+
+def test_same_log_gives_the_same_bytes(healthy):
+    again = hindsight(synthetic_bundle(seconds=40.0, with_initial_pose=False).view())
+
+    assert again is not None
+    assert again.track.xyyaw.tobytes() == healthy.track.xyyaw.tobytes()
+    assert again.track.cov.tobytes() == healthy.track.cov.tobytes()
+
+
+def test_jarvis_is_found_to_some_centimetres(real_logs, tmp_path):
+    folder = real_logs / "inesctec_jarvis"
+    options = IngestOptions(map=folder / "maps" / "i-108_10mm.yaml")
+    log = folder / "jarvis_circular_path_fast.bag"
+    bundle = ingest([log], tmp_path / "jarvis.bundle", options)
+    found = hindsight(bundle.view())
+
+    assert found is not None
+    assert found.coverage == 1.0
+    table = bundle.table("references")
+    reference = se2.interpolate(
+        table.t_ns,
+        np.column_stack(
+            [table["position_xyz"][:, :2], se3.yaw_from_quaternion(table["orientation_xyzw"])]
+        ),
+        found.track.t_ns,
+    )
+    # The reference's frame lies a rigid transform away: the best one is taken off (Umeyama).
+    a = reference[:, :2] - reference[:, :2].mean(axis=0)
+    b = found.track.xyyaw[:, :2] - found.track.xyyaw[:, :2].mean(axis=0)
+    cross = a.T @ b
+    turn = np.arctan2(cross[0, 1] - cross[1, 0], cross[0, 0] + cross[1, 1])
+    off = se2.transform_points(np.array([0.0, 0.0, turn]), a) - b
+    assert np.median(np.hypot(*off.T)) < 0.05

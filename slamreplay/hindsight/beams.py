@@ -46,12 +46,12 @@ def beams_of(scans: ScanSet) -> Beams:
     """Every beam of a scan set; a scan's own motion, from odometry, is taken out linearly."""
     n, width = scans.ranges_m.shape
     kind = np.where(scans.hits, HIT, np.where(scans.misses, MISS, INVALID)).astype(np.int8)
-    limit = np.minimum(np.where(np.isfinite(scans.range_max_m), scans.range_max_m, 0), MAX_REACH_M)
+    limit = np.minimum(np.nan_to_num(scans.range_max_m, nan=0.0), MAX_REACH_M)
     reach = np.where(kind == MISS, limit[:, None], scans.ranges_m).astype(np.float32)
-    kind[~(reach >= MIN_RANGE_M)] = INVALID
-    reach[kind == INVALID] = 0.0
     beam = np.arange(width)
     bearing = scans.angle_min[:, None] + beam * scans.angle_increment[:, None]
+    kind[~(reach >= MIN_RANGE_M) | ~np.isfinite(bearing)] = INVALID
+    reach[kind == INVALID], bearing[kind == INVALID] = 0.0, 0.0
     mount = scans.xyyaw_base_laser
     ends = np.empty((n, width, 2), dtype=np.float32)
     ends[..., 0] = mount[0] + reach * np.cos(bearing + mount[2])

@@ -57,11 +57,13 @@ def hindsight(view: BundleView, *, progress: Progress | None = None) -> Hindsigh
     if scans is None or grid is None or working is None:
         return None
     beams = beams_of(scans)
+    base = view.manifest.frames.base or "base_link"
     say("keyframes", 0.0)
     odometry = odometry_at(scans, beams)
     keys = keyframes(beams, odometry)
+    if not len(keys):
+        return _nowhere(grid.frame_id, base, beams)
     points = [beams.points(k) for k in keys]
-    base = view.manifest.frames.base or "base_link"
     say("scan matching", 0.05)
     chain = scan_matched(points, odometry[keys])
     found = submaps(chain, points, beams.laser_xy)

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
+from scipy.ndimage import binary_dilation
 
 from slamreplay.geometry import se2
 from slamreplay.maps.grid import OccupancyGrid
@@ -21,6 +22,8 @@ from slamreplay.maps.likelihood_field import gaussian_field
 #: Finer maps are searched at this resolution: their extra cells cost memory and add no accuracy
 #: beyond the scanner's own noise.
 WORKING_RESOLUTION_M = 0.05
+#: Wall cells nearer than this to a face that is seen from free space are inside that wall.
+_FACE_CELLS = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,8 +67,16 @@ class WorkingMap:
         return se2.compose(self.origin_xyyaw, xyyaw)
 
     def field(self, sigma_m: float) -> ScoreField:
-        """The score field around its walls."""
-        cells = np.where(self.walls, np.int8(100), np.int8(0))
+        """The score field around the faces of its walls.
+
+        Beams end on faces. Inside a thick wall every pose would score alike, and the match would
+        float by the thickness.
+        """
+        beside_free = binary_dilation(~self.walls & ~self.unknown) & self.walls
+        hidden = self.walls & ~binary_dilation(
+            beside_free, np.ones((3, 3), dtype=bool), iterations=_FACE_CELLS
+        )
+        cells = np.where(beside_free | hidden, np.int8(100), np.int8(0))
         grid = OccupancyGrid(cells, self.resolution_m, np.zeros(3))
         values = gaussian_field(grid, sigma_m, 6.0 * sigma_m)
         values[values < 1e-4] = 0.0

@@ -1,0 +1,151 @@
+"""The steps of hindsight by themselves: places, changes, evidence."""
+
+import numpy as np
+import pytest
+
+from slamreplay.geometry import se2
+from slamreplay.hindsight.beams import HIT, MISS, Beams
+from slamreplay.hindsight.changes import find_changes
+from slamreplay.hindsight.keyframes import keyframes
+from slamreplay.hindsight.places import JUMP_DOUBTFUL, JUMP_SOLID, Hypotheses, best_places
+from slamreplay.maps.grid import OccupancyGrid
+from slamreplay.maps.raycast import cast_rays
+from slamreplay.matching.field import working_map
+
+MOTION = np.array([[1.0, 0.0, 0.0]])
+
+
+def places_of(first, second, jump_cost):
+    def hypotheses(pairs):
+        return Hypotheses(np.array([p for p, _ in pairs]), np.array([s for _, s in pairs]))
+
+    return best_places([hypotheses(first), hypotheses(second)], MOTION, np.array([jump_cost]))
+
+
+def test_motion_outvotes_a_slightly_better_place_elsewhere():
+    first = [((0.0, 0.0, 0.0), 0.9)]
+    second = [((9.0, 5.0, 2.0), 0.9), ((1.05, 0.0, 0.0), 0.8)]
+    found = places_of(first, second, JUMP_SOLID)
+
+    assert found.chosen.tolist() == [0, 1]
+    assert not found.jumps[0]
+
+
+@pytest.mark.parametrize(("cost", "jumps"), [(JUMP_DOUBTFUL, True), (JUMP_SOLID, False)])
+def test_much_better_place_elsewhere_is_a_jump_where_motion_is_doubtful(cost, jumps):
+    first = [((0.0, 0.0, 0.0), 0.9)]
+    second = [((9.0, 5.0, 2.0), 0.9), ((1.05, 0.0, 0.0), 0.5)]
+
+    assert places_of(first, second, cost).jumps.tolist() == [jumps]
+
+
+def test_margin_is_the_lead_over_the_best_wholly_different_sequence():
+    first = [((0.0, 0.0, 0.0), 0.9), ((0.1, 0.0, 0.0), 0.89), ((5.0, 5.0, 0.0), 0.7)]
+    second = [((1.0, 0.0, 0.0), 0.9), ((6.0, 5.0, 0.0), 0.8)]
+    found = places_of(first, second, JUMP_SOLID)
+
+    assert found.margin == pytest.approx(0.15)
+    np.testing.assert_allclose(found.doubt, [36.0, 36.0])
+
+
+def test_without_another_place_there_is_no_margin():
+    found = places_of([((0.0, 0.0, 0.0), 0.9)], [((1.0, 0.0, 0.0), 0.9)], JUMP_SOLID)
+
+    assert found.margin is None
+    assert np.isinf(found.doubt).all()
+
+
+def hall() -> OccupancyGrid:
+    """10 x 10 m with a wall across its upper part and unmapped ground on the right."""
+    cells = np.zeros((200, 200), dtype=np.int8)
+    cells[[0, -1]] = cells[:, [0, -1]] = 100
+    cells[150:153, 20:120] = 100
+    cells[:, 170:198] = -1
+    return OccupancyGrid(cells, 0.05, np.array([1.0, -2.0, 0.3]))
+
+
+POSE = np.array([4.0, 4.0, 0.2])  # in the grid's frame
+BEARINGS = np.arange(0.0, 2.0 * np.pi, np.radians(2.0))
+
+
+def beams_in(worlds: list[np.ndarray], max_range_m: float = 12.0) -> Beams:
+    """One scan for each world (its cells) at 10 Hz from POSE."""
+    reach = np.array(
+        [
+            cast_rays(OccupancyGrid(c, 0.05, np.zeros(3)), POSE, BEARINGS, max_range_m)[0]
+            for c in worlds
+        ]
+    )
+    kind = np.where(np.isfinite(reach), HIT, MISS).astype(np.int8)
+    reach = np.where(np.isfinite(reach), reach, max_range_m)
+    ends = np.stack([reach * np.cos(BEARINGS), reach * np.sin(BEARINGS)], axis=-1)
+    t_ns = np.arange(len(worlds)) * 100_000_000
+    return Beams(t_ns, ends.astype(np.float32), kind, np.zeros(2))
+
+
+def changes_in(worlds: list[np.ndarray]):
+    grid = hall()
+    poses = np.tile(POSE, (len(worlds), 1))
+    return find_changes(grid, working_map(grid), beams_in(worlds), poses)
+
+
+def with_box(low, high) -> np.ndarray:
+    cells = hall().cells.copy()
+    cells[low[1] : high[1], low[0] : high[0]] = 100
+    return cells
+
+
+def test_box_that_stands_is_a_change_and_is_where_it_stands():
+    found = changes_in([with_box((40, 40), (60, 50))] * 60)
+
+    assert found.appeared_share.min() > 0.03
+    assert found.removed_share.max() == 0.0
+    (region,) = found.regions
+    assert region.kind == "appeared"
+    assert region.views == 60
+    rows, cols = np.nonzero(found.appeared)
+    assert (rows.min(), cols.max()) >= (38, 58)
+    centre = hall().centre_of(np.array([48, 50]))
+    assert region.bbox_m[0] < centre[0] < region.bbox_m[2]
+
+
+def test_box_that_stands_too_short_or_keeps_moving_is_no_change():
+    moving = [with_box((40 + k, 40), (50 + k, 50)) for k in range(60)]
+    brief = [with_box((40, 40), (60, 50))] * 20 + [hall().cells] * 60
+
+    for worlds in (moving, brief):
+        found = changes_in(worlds)
+        assert np.nanmax(found.appeared_share) < 0.02
+        assert found.regions == ()
+
+
+def test_wall_that_is_gone_is_a_change():
+    cells = hall().cells.copy()
+    cells[150:153, 20:120] = 0
+    found = changes_in([cells] * 60)
+
+    assert found.removed_share.min() > 0.05
+    assert {r.kind for r in found.regions} == {"removed"}
+    assert found.removed[151, 40:110].mean() > 0.5
+    assert not found.appeared.any()
+
+
+def test_what_stands_on_unmapped_ground_is_unchanged():
+    found = changes_in([with_box((175, 60), (185, 100))] * 60)
+
+    assert found.changed_share.max() == 0.0
+
+
+def test_carried_robot_gets_keyframes_although_its_wheels_stand():
+    near, far = hall().cells, with_box((20, 20), (120, 75))
+    beams = beams_in([near] * 5 + [far] * 5)
+
+    assert keyframes(beams, np.zeros((10, 3))).tolist() == [0, 5]
+
+
+def test_motion_makes_keyframes():
+    beams = beams_in([hall().cells] * 10)
+    odometry = np.column_stack([np.arange(10) * 0.1, np.zeros(10), np.zeros(10)])
+
+    assert keyframes(beams, odometry).tolist() == [0, 3, 6, 9]
+    assert keyframes(beams, se2.compose(odometry, np.zeros(3)) * 0.0).tolist() == [0]

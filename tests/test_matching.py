@@ -1,0 +1,164 @@
+"""Matching against plain-numpy twins and against poses that are known."""
+
+import numpy as np
+import pytest
+
+from slamreplay.geometry import se2
+from slamreplay.maps.grid import OccupancyGrid
+from slamreplay.maps.raycast import cast_rays
+from slamreplay.matching.correlative import Window, climb, match, search_window
+from slamreplay.matching.field import ScoreField, points_field, working_map
+from slamreplay.matching.thinning import thin, thin_persistent
+from slamreplay.matching.whole_map import _score_lattice, search_map, search_space
+from slamreplay.testing.synthetic import room_grid
+
+RNG = np.random.Generator(np.random.PCG64(3))
+SIGMA_M = 0.12
+
+
+def scan_at(xyyaw: np.ndarray) -> np.ndarray:
+    """Points of a scan in the room, base frame, from a pose in the grid's own frame."""
+    grid = OccupancyGrid(room_grid().cells, 0.05, np.zeros(3))
+    bearings = np.arange(-3.1, 3.1, 0.03)
+    reach = cast_rays(grid, xyyaw, bearings, 20.0)[0]
+    return np.column_stack([reach * np.cos(bearings), reach * np.sin(bearings)])
+
+
+def plain_score(field: ScoreField, points: np.ndarray, pose: np.ndarray) -> float:
+    cell = (se2.transform_points(pose, points) - field.corner_xy) / field.resolution_m
+    col, row = np.floor(cell).astype(int).T
+    height, width = field.values.shape
+    inside = (row >= 0) & (row < height) & (col >= 0) & (col < width)
+    return float(field.values[row[inside], col[inside]].sum() / len(points))
+
+
+def test_thinning_gives_each_lattice_cell_its_mean():
+    points = np.array([[0.01, 0.01], [0.03, 0.05], [0.25, 0.01]])
+
+    np.testing.assert_allclose(thin(points, 0.1), [[0.02, 0.03], [0.25, 0.01]])
+
+
+def test_what_one_view_saw_is_left_out():
+    wall = np.column_stack([np.arange(0.05, 4.0, 0.1), np.zeros(40)])
+    person = np.array([[1.0, 2.0]])
+    views = np.repeat([0, 1, 1], [40, 40, 1])
+
+    kept = thin_persistent(np.concatenate([wall, wall, person]), views, 0.1, 30)
+
+    assert len(kept) == 30
+    assert (kept[:, 1] < 0.1).all()
+
+
+def test_points_field_is_the_largest_bell_over_each_cell():
+    points = RNG.uniform(0.0, 1.0, (5, 2))
+    field = points_field(points, 0.08)
+    rows, cols = np.indices(field.values.shape)
+    centres = field.corner_xy + (np.stack([cols, rows], axis=-1) + 0.5) * field.resolution_m
+    d2 = ((centres[:, :, None] - points) ** 2).sum(axis=-1).min(axis=-1)
+
+    expected = np.exp(-0.5 * d2 / 0.08**2)
+
+    near = expected > np.exp(-0.5 * 2.5**2)
+    np.testing.assert_allclose(field.values[near], expected[near], atol=1e-6)
+
+
+def test_working_map_is_cropped_and_thinned_and_keeps_its_place():
+    cells = np.full((600, 700), -1, dtype=np.int8)
+    cells[203:301, 102:401] = 0
+    cells[250, 300] = 100
+    grid = OccupancyGrid(cells, 0.01, np.array([1.0, 2.0, 0.4]))
+
+    working = working_map(grid)
+
+    assert working is not None
+    assert working.resolution_m == pytest.approx(0.05)
+    assert working.walls.sum() == 1
+    row, col = np.argwhere(working.walls)[0]
+    at = working.corner_xy + (np.array([col, row]) + 0.5) * working.resolution_m
+    in_map = working.to_map(np.array([*at, 0.0]))[:2]
+    assert np.abs(in_map - grid.centre_of(np.array([250, 300]))).max() < 0.05
+
+
+def test_map_without_known_cells_or_walls_gives_nothing():
+    assert working_map(OccupancyGrid(np.full((9, 9), -1, np.int8), 0.05, np.zeros(3))) is None
+    assert working_map(OccupancyGrid(np.zeros((9, 9), np.int8), 0.05, np.zeros(3))) is None
+
+
+def test_window_search_finds_the_best_pose_of_its_lattice():
+    points = RNG.uniform(-1.0, 1.0, (40, 2))
+    field = points_field(points, 0.1)
+    window = Window(0.2, 0.1, 0.2, 0.1)
+    centre = np.array([0.13, -0.08, 0.1])
+    poses = [
+        centre + np.array([i * 0.1, j * 0.1, k * 0.1])
+        for i in range(-2, 3)
+        for j in range(-2, 3)
+        for k in range(-2, 3)
+    ]
+
+    pose, score = search_window(field, points, centre, window)
+
+    best = max(plain_score(field, points, p) for p in poses)
+    assert score == pytest.approx(best, abs=1e-6)
+    assert plain_score(field, points, pose) == pytest.approx(best, abs=1e-6)
+
+
+def test_climb_reaches_the_true_pose():
+    grid = room_grid()
+    field = working_map(grid).field(SIGMA_M)
+    truth = np.array([3.7, 6.1, 0.7])
+    found = climb(field, thin(scan_at(truth), 0.1), truth + np.array([0.06, -0.05, 0.02]))
+
+    assert np.abs(found.xyyaw - truth)[:2].max() < 0.03
+    assert abs(found.xyyaw[2] - truth[2]) < 0.005
+    assert found.score > 0.9
+    assert np.linalg.eigvalsh(found.information).min() > 0.0
+
+
+def test_a_single_wall_holds_no_position_along_it():
+    wall = np.column_stack([np.linspace(-3.0, 3.0, 100), np.full(100, 1.0)])
+    long = np.column_stack([np.linspace(-9.0, 9.0, 300), np.full(300, 1.0)])
+    found = climb(points_field(long, 0.1), wall, np.array([0.0, 0.03, 0.0]))
+
+    assert abs(found.xyyaw[1]) < 0.01
+    assert abs(found.xyyaw[0]) < 0.02
+    assert found.information[1, 1] > 1000.0
+    assert abs(found.information[0, 0]) < 0.01 * found.information[1, 1]
+
+
+def test_matching_no_points_stays_where_it_is():
+    field = working_map(room_grid()).field(SIGMA_M)
+    found = match(field, np.empty((0, 2)), np.array([1.0, 1.0, 0.0]), Window(0.1, 0.1, 0.1, 0.1))
+
+    assert found.score == 0.0
+    assert found.xyyaw[:2] == pytest.approx([1.0, 1.0], abs=0.2)
+
+
+def test_lattice_scores_equal_their_plain_sum():
+    coarse = RNG.integers(0, 251, (9, 11)).astype(np.uint8)
+    cells = RNG.uniform(-3.0, 3.0, (10, 2))
+    headings = np.arange(16) * (np.pi / 8.0)
+    reach = 6
+    best, which = _score_lattice(np.pad(coarse, reach), reach, cells, headings, 2)
+
+    padded = np.pad(coarse, reach).astype(int)
+    for sector in range(8):
+        scores = []
+        for heading in headings[2 * sector : 2 * sector + 2]:
+            turned = se2.transform_points(np.array([0.5, 0.5, heading]), cells)
+            col, row = np.floor(turned).astype(int).T + reach
+            rows, cols = np.indices(coarse.shape)
+            scores.append(padded[rows[..., None] + row, cols[..., None] + col].sum(axis=-1))
+        np.testing.assert_array_equal(best[sector], np.max(scores, axis=0))
+        np.testing.assert_array_equal(which[sector], np.argmax(scores, axis=0))
+
+
+@pytest.mark.parametrize("truth", [(2.0, 2.0, 0.3), (9.5, 6.5, -2.4), (6.0, 7.4, 1.9)])
+def test_whole_map_search_finds_a_scan_anywhere(truth):
+    working = working_map(room_grid())
+    space = search_space(working, working.field(SIGMA_M))
+    poses, scores = search_map(space, thin(scan_at(np.array(truth)), 0.2))
+
+    assert np.abs(se2.between(np.array(truth), poses[0])).max() < 0.05
+    assert scores[0] > scores[1] + 0.03
+    assert (np.diff(scores) <= 1e-12).all()
