@@ -9,9 +9,8 @@ import tempfile
 import traceback
 from importlib import import_module
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
-import click
 import typer
 
 from slamreplay import __version__
@@ -23,8 +22,10 @@ EXIT_INPUT, EXIT_FAULT, EXIT_INTERRUPTED = 2, 70, 130
 #: Command modules, in the order of the help; each has `register(app)` and imports nothing heavy.
 COMMANDS = ("report", "ingest", "inspect", "perturb", "simulate", "explain", "list_")
 
+#: What every usage error is: typer carries a click of its own, so it is asked for its base class.
+_UsageFault: type[Any] = typer.BadParameter.__mro__[2]
+
 app = typer.Typer(
-    no_args_is_help=True,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
     context_settings={"help_option_names": ["-h", "--help"]},
@@ -40,9 +41,7 @@ def _print_version(value: bool) -> None:
 
 @app.callback()
 def _root(
-    debug: Annotated[
-        bool, typer.Option("--debug", help="Show the traceback of a fault.")
-    ] = False,
+    debug: Annotated[bool, typer.Option("--debug", help="Show the traceback of a fault.")] = False,
     version: Annotated[
         bool,
         typer.Option(
@@ -64,11 +63,13 @@ def run() -> int:
     try:
         for name in COMMANDS:
             import_module(f"slamreplay.cli.{name}").register(app)
-        return int(app(standalone_mode=False) or 0)
-    except click.ClickException as error:
-        error.show()
+        return int(app(sys.argv[1:] or ["--help"], standalone_mode=False) or 0)
+    except _UsageFault as error:
+        where = error.ctx.command_path if getattr(error, "ctx", None) else "slamreplay"
+        message = " ".join(error.format_message().split()).rstrip(".")
+        typer.echo(f"slamreplay: {message} (hint: see {where} --help)", err=True)
         return EXIT_INPUT
-    except (click.Abort, KeyboardInterrupt):
+    except (typer.Abort, KeyboardInterrupt):
         typer.echo("stopped", err=True)
         return EXIT_INTERRUPTED
     except BrokenPipeError:  # the reader of our output went away: `slamreplay inspect B | head`
