@@ -1,8 +1,11 @@
 """A bundle written and read back is the same bundle, and a damaged one is refused."""
 
+import os
+
 import numpy as np
 import pytest
 
+from slamreplay.bundle.atomic import check_target
 from slamreplay.bundle.manifest import Clock, Frames, Manifest
 from slamreplay.bundle.run import Estimate, Innovations, Run, Trial, read_run, run_bytes
 from slamreplay.bundle.schema import TABLES
@@ -128,3 +131,15 @@ def test_ragged_take_repeats_and_reorders():
     ragged = Ragged.of([[1], [2, 3], []], np.int8)
 
     assert [ragged.take(np.array([2, 1, 1]))[i].tolist() for i in range(3)] == [[], [2, 3], [2, 3]]
+
+
+def test_unwritable_place_is_refused_before_the_work(tmp_path):
+    (tmp_path / "file").write_text("mine")
+    (tmp_path / "locked").mkdir(mode=0o555)
+
+    check_target(tmp_path / "new" / "folder", "manifest.json")
+    with pytest.raises(OutputError, match="is no folder"):
+        check_target(tmp_path / "file" / "b", "manifest.json")
+    if os.geteuid() != 0:  # root may write anywhere
+        with pytest.raises(OutputError, match="takes no new entries"):
+            check_target(tmp_path / "locked" / "b", "manifest.json")

@@ -24,7 +24,7 @@ def atomic_folder(target: Path, *, marker: str) -> Iterator[Path]:
     Raises:
         OutputError: `target` is somebody else's, or cannot be written.
     """
-    refuse_foreign(target, marker)
+    check_target(target, marker)
     made: list[Path] = []
     try:
         for parent in reversed([p for p in target.parents if not p.exists()]):
@@ -50,18 +50,29 @@ def atomic_folder(target: Path, *, marker: str) -> Iterator[Path]:
         raise
 
 
-def refuse_foreign(target: Path, marker: str) -> None:
-    """Raise OutputError where `target` exists and is not an empty folder or one with `marker`."""
-    if not (target.exists() or target.is_symlink()):
-        return
+def check_target(target: Path, marker: str) -> None:
+    """Refuse a place that cannot become a folder of ours, before any work is spent on it.
+
+    Raises:
+        OutputError: `target` exists and is neither empty nor known by `marker`, or the nearest
+            folder that exists above it takes no new entries.
+    """
     try:
-        ours = target.is_dir() and ((target / marker).exists() or not any(target.iterdir()))
+        if target.exists() or target.is_symlink():
+            ours = target.is_dir() and ((target / marker).exists() or not any(target.iterdir()))
+            if not ours:
+                raise OutputError(
+                    f"exists and holds no {marker}",
+                    where=target,
+                    hint="name another output with -o",
+                )
+        above = next(p for p in target.absolute().parents if p.exists())
+        if not above.is_dir():
+            raise NotADirectoryError(None, f"{above} is no folder")
+        if not os.access(above, os.W_OK | os.X_OK):
+            raise PermissionError(None, f"{above} takes no new entries")
     except OSError as error:
         raise _cannot_write(target, error) from error
-    if not ours:
-        raise OutputError(
-            f"exists and holds no {marker}", where=target, hint="name another output with -o"
-        )
 
 
 def write_file(target: Path, content: bytes) -> None:

@@ -59,7 +59,7 @@ def perturb(
 
     The table shows how far each run is from the undisturbed run of the same estimator.
     """
-    from slamreplay.bundle.atomic import refuse_foreign
+    from slamreplay.bundle.atomic import check_target
     from slamreplay.cli.main import cache_folder
     from slamreplay.cli.progress import progress_bar
     from slamreplay.estimators import ESTIMATORS
@@ -68,7 +68,7 @@ def perturb(
     from slamreplay.replay.metrics import trial_metrics
     from slamreplay.replay.runner import replay
 
-    refuse_foreign(output, RUNS)
+    check_target(output, RUNS)
     for text in perturbations or ():  # before minutes are spent on reading the log
         parse_perturbation(text)
     for name in estimators or ():

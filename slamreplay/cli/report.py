@@ -69,10 +69,10 @@ def _report(
     fail_on: FailOn = None,
     as_json: Json = False,
 ) -> None:
-    from slamreplay.bundle.atomic import refuse_foreign
+    from slamreplay.bundle.atomic import check_target
 
     threshold = _severity(fail_on)
-    refuse_foreign(output, "report.json")  # before the work, not after it
+    check_target(output, "report.json")  # before the work, not after it
     options = ingest_options(
         map_yaml=map_yaml,
         topics=topics,

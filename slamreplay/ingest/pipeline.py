@@ -6,7 +6,7 @@ import hashlib
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
-from slamreplay.bundle.atomic import refuse_foreign
+from slamreplay.bundle.atomic import check_target
 from slamreplay.bundle.manifest import Frames, Loss, Manifest, Role, Source
 from slamreplay.bundle.store import MANIFEST, write_bundle
 from slamreplay.bundle.tables import Table
@@ -47,7 +47,7 @@ def ingest(
         UsageError: options that do not fit the log.
         OutputError: the target is somebody else's, or cannot be written.
     """
-    refuse_foreign(target, MANIFEST)
+    check_target(target, MANIFEST)
     overrides = read_overrides(options.topics)
     with open_log(logs) as (readers, losses):
         sources = [s for reader in readers for s in reader.sources]

@@ -22,7 +22,7 @@ from rosbags.interfaces import (
 )
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from slamreplay.bundle.atomic import atomic_folder, refuse_foreign
+from slamreplay.bundle.atomic import atomic_folder, check_target
 from slamreplay.errors import OutputError
 from slamreplay.messages.definitions import DEFINITIONS, LATER_DEFINITIONS
 from slamreplay.simulate.messages import Messages
@@ -53,7 +53,7 @@ def write_log(target: Path, make: Callable[[Messages], Sequence[Record]]) -> Non
                 where=target,
                 hint="use .mcap, .db3, .bag, or no suffix for a rosbag2 folder",
             )
-        refuse_foreign(target, FOLDER_MARKER)
+        check_target(target, FOLDER_MARKER)
         store = _store(2)
         log = make(Messages(store, 2))
         with atomic_folder(target, marker=FOLDER_MARKER) as work, _scratch(target) as scratch:
