@@ -7,9 +7,8 @@ from rosbags.typesys import Stores, get_typestore
 from slamreplay.estimators import ESTIMATORS
 from slamreplay.ingest import DECODERS
 from slamreplay.perturb import PERTURBATIONS
-from slamreplay.testing.decoders import check_decoder, check_payload
-from slamreplay.testing.estimators import check_estimator
-from slamreplay.testing.perturbations import check_perturbation
+from slamreplay.testing import check_decoder, check_estimator, check_perturbation
+from slamreplay.testing.decoders import check_payload
 
 #: Name, and by how much sampling noise lets its poses miss a moved map frame: m, rad.
 ESTIMATOR_LINES = {
