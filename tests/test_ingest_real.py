@@ -26,12 +26,16 @@ EXPECTED = {
         ("map_contours_nav", "odom", "base_footprint"),
         {
             "scan": "/driver_laser_navigation/laser_scan", "pose": "/tf",
+            "scan_2": "/driver_laser_security/laser_scan",
             "reference": "/pose_ground_truth", "command": "/cmd_vel",
         },
     ),
     "inesctec_jarvis/guardian_3.bag": (
         (None, "odom", "base_footprint"),
-        {"odometry": "/guardian_node/odom", "scan": "/scan", "command": "/guardian_node/command"},
+        {
+            "odometry": "/guardian_node/odom", "scan": "/scan", "scan_2": "/hokuyo_back_scan",
+            "command": "/guardian_node/command",
+        },
     ),
     "olin_neato/ac109_3_demo.bag": (
         ("map", "odom", "base_link"),

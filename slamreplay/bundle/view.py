@@ -140,6 +140,7 @@ ROLE_TABLES = {
     "odometry": "odometry",
     "imu": "imu",
     "scan": "scans",
+    "scan_2": "scans",
     "points": "points",
     "pose": "poses",
     "covariance": "poses",

@@ -10,6 +10,7 @@ from slamreplay.bundle.view import ROLE_TABLES
 from slamreplay.errors import UsageError
 from slamreplay.ingest import roles
 from slamreplay.ingest.frames import direct_pose, find_frames, settle, without_frame
+from slamreplay.ingest.lasers import second_scan
 from slamreplay.ingest.leaks import repeated_reference
 from slamreplay.ingest.names import is_map_frame, is_reference, tokens
 from slamreplay.ingest.roles import Choice
@@ -83,6 +84,8 @@ def settle_cast(topics: Sequence[TopicRows], overrides: Mapping[str, str]) -> Ca
         "command": roles.choose_command(free("command")),
         "recovery": roles.choose_recovery(free("recovery")),
     }
+    if (first := found["scan"]) is not None:
+        found["scan"], found["scan_2"] = second_scan(free("scan_2"), first, tf_rows, frames)
     found |= given
     if found["pose"] is None and (direct := direct_pose(tf_rows, frames)) is not None:
         others.append(direct)

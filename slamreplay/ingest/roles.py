@@ -82,7 +82,7 @@ def choose_scan(topics: Sequence[TopicRows]) -> Choice | None:
     found = [t for t in topics if t.table == "scans" and len(t)]
     if not found:
         return None
-    beams = {id(t): _valid_beams(t) for t in found}
+    beams = {id(t): valid_beams(t) for t in found}
     most = max(beams.values())
     close = [t for t in found if beams[id(t)] >= 0.9 * most]
 
@@ -212,7 +212,7 @@ def _correction(topics: Sequence[TopicRows], frames: Frames) -> TopicRows | None
     return max(found, key=lambda t: (counts[id(t)], t.topic)) if found else None
 
 
-def _valid_beams(topic: TopicRows) -> float:
+def valid_beams(topic: TopicRows) -> float:
     """Beams of all scans within their range limits."""
     ranges = topic.columns["ranges_m"]
     far = np.repeat(topic.columns["range_max_m"], ranges.lengths)
