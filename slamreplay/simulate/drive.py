@@ -83,10 +83,17 @@ class BackUp:
 
 @dataclass(frozen=True)
 class Carry:
-    """Somebody lifts the robot and puts it down at (x, y, yaw): its wheels do not turn."""
+    """Somebody moves the robot by hand to (x, y, yaw).
+
+    Attributes:
+        to_xyyaw: where it ends up.
+        duration_s: how long that takes.
+        wheels: share of the motion that its wheels turn with; 0 when it is lifted.
+    """
 
     to_xyyaw: tuple[float, float, float]
     duration_s: float = 4.0
+    wheels: float = 0.0
 
 
 Step = Follow | Pause | Spin | BackUp | Carry
@@ -155,10 +162,11 @@ class _Robot:
         while abs(self.v) > 1e-9 or abs(self.w) > 1e-9:
             self.tick(0.0, 0.0)
 
-    def put(self, pose: se2.Array) -> None:
-        """Be somewhere else without turning a wheel."""
+    def put(self, pose: se2.Array, wheels: float) -> None:
+        """Be somewhere else; the wheels turn with that share of the motion."""
         step = se2.between(self.pose, pose)
-        self._record(float(step[0]) / _DT, float(step[2]) / _DT, 0.0, 0.0)
+        v, w = float(step[0]) / _DT, float(step[2]) / _DT
+        self._record(v, w, wheels * v, wheels * w)
         self.pose = pose
 
 
@@ -251,4 +259,5 @@ def _carry(robot: _Robot, step: Carry) -> None:
     turn = float(se2.wrap_angle(goal[2] - start[2]))
     for i in range(1, n + 1):
         part = 0.5 - 0.5 * np.cos(np.pi * i / n)
-        robot.put(np.array([*(start[:2] + part * (goal[:2] - start[:2])), start[2] + part * turn]))
+        xy = start[:2] + part * (goal[:2] - start[:2])
+        robot.put(np.array([*xy, start[2] + part * turn]), step.wheels)

@@ -38,9 +38,10 @@ def localize(
     odometry: Odometry,
     start: tuple[se2.Array, se2.Array],
     seed: int,
+    config: AmclConfig,
 ) -> Beliefs:
     """Run AMCL over all scans from a start pose (3,) with covariance (3, 3)."""
-    amcl = AmclFilter(AmclConfig(), grid, seed)
+    amcl = AmclFilter(config, grid, seed)
     amcl.initialise(*start)
     base = odometry_at(odometry, scans.t_s)
     n = len(scans.t_s)

@@ -19,11 +19,13 @@ class Walker:
         waypoints: corners of the way, m.
         speed: m/s.
         offset_m: how far along the way they are at the start.
+        radius_m: of the disc; larger for somebody who pushes a pallet.
     """
 
     waypoints: tuple[tuple[float, float], ...]
     speed: float = 1.1
     offset_m: float = 0.0
+    radius_m: float = RADIUS_M
 
     def at(self, t_s: se2.Array) -> se2.Array:
         """(N, 2) positions at times (N,) since the start."""
@@ -47,7 +49,7 @@ def ranges_to(walkers: tuple[Walker, ...], t_s: se2.Array, rays: se2.Array) -> s
         off = walker.at(t_s) - rays[:, :2]
         along = off[:, 0] * np.cos(rays[:, 2]) + off[:, 1] * np.sin(rays[:, 2])
         beside2 = np.sum(off**2, axis=1) - along**2
-        half = np.sqrt(np.maximum(RADIUS_M**2 - beside2, 0.0))
-        hit = (beside2 < RADIUS_M**2) & (along > half)
+        half = np.sqrt(np.maximum(walker.radius_m**2 - beside2, 0.0))
+        hit = (beside2 < walker.radius_m**2) & (along > half)
         nearest = np.where(hit, np.minimum(nearest, along - half), nearest)
     return nearest

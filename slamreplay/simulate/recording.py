@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -12,9 +12,11 @@ from slamreplay.simulate import sensors
 from slamreplay.simulate.drive import Motion, drive
 from slamreplay.simulate.localizer import Beliefs, localize
 from slamreplay.simulate.scenarios import CLICKED_COV, Scenario
-from slamreplay.simulate.worlds import MAP_RESOLUTION_M, TRUE_RESOLUTION_M, rasterise
+from slamreplay.simulate.worlds import rasterise, redrawn
 
 ODOMETRY_RATE_HZ = 25.0
+#: Two lasers do not turn in step: the rear one sweeps somewhat later.
+_REAR_FROM_S = 0.137
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,9 +26,11 @@ class Recording:
     Attributes:
         scenario: what was played.
         map: the map the robot has.
+        logged_map: the map in the log; the robot's own but where a scenario says otherwise.
         standing: what beams meet, people apart.
         motion: the truth.
-        scans: the lidar.
+        scans: the lidar; `t_s` is when they were taken, whatever their stamps say.
+        rear: the second laser, None where there is none.
         odometry: the wheels.
         gyro: (N, 3) turn rates, one row per sample of the motion.
         force: (N, 3) specific forces.
@@ -37,9 +41,11 @@ class Recording:
 
     scenario: Scenario
     map: OccupancyGrid
+    logged_map: OccupancyGrid
     standing: OccupancyGrid
     motion: Motion
     scans: sensors.Scans
+    rear: sensors.Scans | None
     odometry: sensors.Odometry
     gyro: se2.Array
     force: se2.Array
@@ -56,17 +62,69 @@ def record(scenario: Scenario, seed: int | None = None) -> Recording:
     lidar_rng, wheel_rng, imu_rng, start_rng = (
         np.random.Generator(np.random.PCG64(s)) for s in streams[:4]
     )
-    grid = rasterise(scenario.mapped, MAP_RESOLUTION_M, as_map=True)
-    standing = rasterise(scenario.standing, TRUE_RESOLUTION_M, as_map=False)
+    grid = rasterise(scenario.mapped, scenario.map_resolution_m, as_map=True)
+    standing = rasterise(scenario.standing, scenario.true_resolution_m, as_map=False)
     motion = drive(scenario.start, scenario.tour)
     scans = sensors.scan(scenario.lidar, standing, scenario.walkers, motion, lidar_rng)
+    scans = _seen(scans, scenario)
+    rear = None
+    if scenario.rear is not None:
+        rear = sensors.scan(
+            scenario.rear,
+            standing,
+            scenario.walkers,
+            motion,
+            lidar_rng,
+            sensors.XYYAW_BASE_REAR,
+            _REAR_FROM_S,
+        )
+        rear = _seen(rear, scenario)
     odometry = sensors.wheel_odometry(scenario.wheels, motion, ODOMETRY_RATE_HZ, wheel_rng)
     gyro, force = sensors.imu(motion, imu_rng)
     clicked = np.array(scenario.believed_start or scenario.start)
     # Nobody clicks exactly; a careful person is within a decimetre and a few degrees.
     clicked = clicked + start_rng.standard_normal(3) * np.array([0.08, 0.08, 0.03])
     filter_seed = int(streams[4].generate_state(1)[0])
-    beliefs = localize(grid, scenario.lidar, scans, odometry, (clicked, CLICKED_COV), filter_seed)
-    return Recording(
-        scenario, grid, standing, motion, scans, odometry, gyro, force, beliefs, clicked, seed
+    # The filter on board pairs scans and odometry by their stamps, right or wrong.
+    late_s = scenario.scan_late_s - scenario.odometry_late_s
+    stamped = replace(scans, t_s=scans.t_s + late_s)
+    beliefs = localize(
+        grid,
+        scenario.lidar,
+        stamped,
+        odometry,
+        (clicked, CLICKED_COV),
+        filter_seed,
+        scenario.amcl,
     )
+    return Recording(
+        scenario,
+        grid,
+        _logged_map(scenario, grid),
+        standing,
+        motion,
+        scans,
+        rear,
+        odometry,
+        gyro,
+        force,
+        beliefs,
+        clicked,
+        seed,
+    )
+
+
+def _seen(scans: sensors.Scans, scenario: Scenario) -> sensors.Scans:
+    """What is left of the scans after bursts of lost ones."""
+    kept = np.ones(len(scans.t_s), dtype=bool)
+    for low, high in scenario.no_scans:
+        kept &= (scans.t_s < low) | (scans.t_s >= high)
+    return sensors.Scans(scans.t_s[kept], scans.ranges[kept])
+
+
+def _logged_map(scenario: Scenario, grid: OccupancyGrid) -> OccupancyGrid:
+    """The map of the log: of another world, or the robot's own drawn in another frame."""
+    if scenario.logged is not None:
+        grid = rasterise(scenario.logged, scenario.map_resolution_m, as_map=True)
+    frame = np.array(scenario.xyyaw_logged_map)
+    return redrawn(grid, frame) if frame.any() else grid

@@ -7,12 +7,20 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from slamreplay.errors import UsageError
+from slamreplay.estimators.amcl.config import AmclConfig
 from slamreplay.geometry import se2
 from slamreplay.simulate import SCENARIOS
 from slamreplay.simulate.drive import BackUp, Carry, Follow, Pause, Slip, Spin, Step
 from slamreplay.simulate.people import Walker
 from slamreplay.simulate.sensors import Lidar, WheelErrors
-from slamreplay.simulate.worlds import World, box, office, warehouse
+from slamreplay.simulate.worlds import (
+    MAP_RESOLUTION_M,
+    TRUE_RESOLUTION_M,
+    World,
+    box,
+    office,
+    warehouse,
+)
 
 
 @dataclass(frozen=True)
@@ -30,6 +38,16 @@ class Scenario:
         walkers: the people.
         lidar: the range finder.
         wheels: how wrong the odometry is.
+        rear: a second laser that looks back, None where there is one only.
+        amcl: parameters of the localizer on board.
+        map_resolution_m: edge of a map cell.
+        true_resolution_m: edge of a cell of what beams really meet.
+        scan_late_s: stamps of scans are late by this: they name a moment after the sweep.
+        odometry_late_s: the same of odometry and its tf.
+        no_scans: stretches (from, to) in s in which no scan was recorded nor seen.
+        without: what the robot does not publish: "odometry", "tf".
+        logged: the world the map in the log was drawn from, where it is not the robot's own.
+        xyyaw_logged_map: (3) the robot's map frame in the frame of the map in the log.
     """
 
     mapped: World
@@ -42,6 +60,16 @@ class Scenario:
     walkers: tuple[Walker, ...] = ()
     lidar: Lidar = field(default_factory=Lidar)
     wheels: WheelErrors = field(default_factory=WheelErrors)
+    rear: Lidar | None = None
+    amcl: AmclConfig = field(default_factory=AmclConfig)
+    map_resolution_m: float = MAP_RESOLUTION_M
+    true_resolution_m: float = TRUE_RESOLUTION_M
+    scan_late_s: float = 0.0
+    odometry_late_s: float = 0.0
+    no_scans: tuple[tuple[float, float], ...] = ()
+    without: frozenset[str] = frozenset()
+    logged: World | None = None
+    xyyaw_logged_map: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
 
 #: What rviz sends with a clicked pose: 0.5 m, 0.5 m, 15 deg.

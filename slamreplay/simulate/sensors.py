@@ -15,6 +15,8 @@ from slamreplay.simulate.people import Walker, ranges_to
 
 #: The laser on the robot: off the middle line and turned a little, as mounts are.
 XYYAW_BASE_LASER = np.array([0.21, -0.04, 0.07])
+#: A second laser, at the other end of the robot, looks back.
+XYYAW_BASE_REAR = np.array([-0.24, 0.05, np.pi - 0.03])
 #: Ranges come in steps of 1/1024 m: a millimetre that leaves most bits of a float zero, so that
 #: logs compress; IMU and odometry have their own steps for the same reason.
 RANGE_STEP_M = 2.0**-10
@@ -89,12 +91,14 @@ def scan(
     walkers: tuple[Walker, ...],
     motion: Motion,
     rng: np.random.Generator,
+    xyyaw_base_laser: se2.Array = XYYAW_BASE_LASER,
+    first_s: float = 0.1,
 ) -> Scans:
     """All scans of a drive; each beam is cast from where the laser is at its own time."""
     sweep_s = lidar.time_increment_s * (lidar.beams - 1)
-    t_s = np.arange(0.1, motion.t_s[-1] - sweep_s, 1.0 / lidar.rate_hz)
+    t_s = np.arange(first_s, motion.t_s[-1] - sweep_s, 1.0 / lidar.rate_hz)
     beam_t = (t_s[:, None] + np.arange(lidar.beams) * lidar.time_increment_s).ravel()
-    rays = se2.compose(motion.poses_at(beam_t), XYYAW_BASE_LASER)
+    rays = se2.compose(motion.poses_at(beam_t), xyyaw_base_laser)
     rays[:, 2] += np.tile(lidar.bearings, len(t_s))
     ranges = cast_rays(standing, rays, np.zeros(1), lidar.range_max_m)[:, 0]
     ranges = np.minimum(ranges, ranges_to(walkers, beam_t, rays))

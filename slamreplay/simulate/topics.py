@@ -17,7 +17,7 @@ from slamreplay.simulate.localizer import odometry_at
 from slamreplay.simulate.messages import Messages
 from slamreplay.simulate.recording import Recording
 from slamreplay.simulate.scenarios import CLICKED_COV
-from slamreplay.simulate.sensors import XYYAW_BASE_LASER
+from slamreplay.simulate.sensors import XYYAW_BASE_LASER, XYYAW_BASE_REAR, Lidar, Scans
 
 #: Stamps start here: a fixed time, for a log must not depend on when it was made.
 START_NS = 1_750_000_000 * NS_PER_S
@@ -60,9 +60,11 @@ def _ns(t_s: float) -> int:
 
 
 def _start(r: Recording, m: Messages) -> Iterator[Record]:
-    laser = m.transform(_ns(0), ("base_link", "laser"), XYYAW_BASE_LASER, LASER_HEIGHT_M)
-    yield Record(_ns(0.005), "/tf_static", "tf2_msgs/TFMessage", laser)
-    grid = m.grid(_ns(0), "map", r.map.cells, r.map.resolution_m, r.map.origin_xyyaw)
+    for laser in _lasers(r):
+        mount = m.transform(_ns(0), ("base_link", laser.frame), laser.mount, LASER_HEIGHT_M)
+        yield Record(_ns(0.005), "/tf_static", "tf2_msgs/TFMessage", mount)
+    known = r.logged_map
+    grid = m.grid(_ns(0), "map", known.cells, known.resolution_m, known.origin_xyyaw)
     yield Record(_ns(0.005), "/map", "nav_msgs/OccupancyGrid", grid)
     clicked = m.pose_stamped_with_covariance(_ns(0.02), r.start, CLICKED_COV)
     yield Record(
@@ -77,11 +79,15 @@ def _wheels(r: Recording, m: Messages) -> Iterator[Record]:
     frames = ("odom", "base_link")
     twist_cov = np.diag([4e-4, 1e-6, 4e-4])
     o = r.odometry
+    late_s = r.scenario.odometry_late_s
+    if "odometry" in r.scenario.without:
+        return
     for t_s, xyyaw, cov, twist in zip(o.t_s, o.xyyaw, o.cov, o.twist, strict=True):
-        stamp, arrival = _ns(t_s), _ns(t_s + _ODOMETRY_LATE)
+        stamp, arrival = _ns(t_s + late_s), _ns(t_s + _ODOMETRY_LATE)
         message = m.odometry(stamp, frames, xyyaw, cov, twist, twist_cov)
         yield Record(arrival, "/odom", "nav_msgs/Odometry", message)
-        yield Record(arrival, "/tf", "tf2_msgs/TFMessage", m.transform(stamp, frames, xyyaw))
+        if "tf" not in r.scenario.without:
+            yield Record(arrival, "/tf", "tf2_msgs/TFMessage", m.transform(stamp, frames, xyyaw))
 
 
 def _inertial(r: Recording, m: Messages) -> Iterator[Record]:
@@ -103,35 +109,77 @@ def _inertial(r: Recording, m: Messages) -> Iterator[Record]:
         yield Record(_ns(t_s + _IMU_LATE), "/imu", "sensor_msgs/Imu", message)
 
 
+@dataclass(frozen=True, eq=False)
+class _Laser:
+    """One laser of the robot: where its scans go and where it sits."""
+
+    topic: str
+    frame: str
+    mount: se2.Array
+    lidar: Lidar
+    scans: Scans
+
+
+def _lasers(r: Recording) -> tuple[_Laser, ...]:
+    lidar, rear = r.scenario.lidar, r.scenario.rear
+    if rear is None or r.rear is None:
+        return (_Laser("/scan", "laser", XYYAW_BASE_LASER, lidar, r.scans),)
+    return (
+        _Laser("/scan_front", "laser_front", XYYAW_BASE_LASER, lidar, r.scans),
+        _Laser("/scan_rear", "laser_rear", XYYAW_BASE_REAR, rear, r.rear),
+    )
+
+
 def _lidar(r: Recording, m: Messages) -> Iterator[Record]:
     """Scans, and what the localizer makes of each as soon as it is there."""
-    lidar = r.scenario.lidar
-    sweep_s = lidar.time_increment_s * (lidar.beams - 1)
-    bearings = lidar.bearings
+    front, *others = _lasers(r)
     b = r.beliefs
-    for i, t_s in enumerate(r.scans.t_s):
-        stamp, arrival_s = _ns(t_s), t_s + sweep_s + _SCAN_LATE
-        message = m.make(
-            "sensor_msgs/LaserScan",
-            header=m.header(stamp, "laser"),
-            angle_min=float(bearings[0]),
-            angle_max=float(bearings[-1]),
-            angle_increment=float(bearings[1] - bearings[0]),
-            time_increment=lidar.time_increment_s,
-            scan_time=1.0 / lidar.rate_hz,
-            range_min=lidar.range_min_m,
-            range_max=lidar.range_max_m,
-            ranges=r.scans.ranges[i],
-            intensities=np.empty(0, dtype=np.float32),
-        )
-        yield Record(_ns(arrival_s), "/scan", "sensor_msgs/LaserScan", message)
+    has_odometry = "odometry" not in r.scenario.without
+    bases = odometry_at(r.odometry, _stamps(r) - r.scenario.odometry_late_s)
+    for i, t_s in enumerate(front.scans.t_s):
+        stamp, arrival_s = _ns(t_s + r.scenario.scan_late_s), t_s + _arrival_s(front)
+        yield _scan(r, m, front, i)
         answer = _ns(arrival_s + _AMCL_LATE)
-        if b.updated[i]:
-            pose = m.pose_stamped_with_covariance(stamp, b.mean[i], b.cov[i])
+        if b.updated[i] or not has_odometry:
+            # Nothing carries a pose on where there is no odometry: such localizers send them all.
+            mean = b.mean[i] if has_odometry else se2.compose(b.map_odom[i], bases[i])
+            pose = m.pose_stamped_with_covariance(stamp, mean, b.cov[i])
             yield Record(answer, "/amcl_pose", "geometry_msgs/PoseWithCovarianceStamped", pose)
-        frames = ("map", "odom")
-        correction = m.transform(stamp + TRANSFORM_TOLERANCE_NS, frames, b.map_odom[i])
-        yield Record(answer, "/tf", "tf2_msgs/TFMessage", correction)
+        if has_odometry and "tf" not in r.scenario.without:
+            frames = ("map", "odom")
+            correction = m.transform(stamp + TRANSFORM_TOLERANCE_NS, frames, b.map_odom[i])
+            yield Record(answer, "/tf", "tf2_msgs/TFMessage", correction)
+    for laser in others:
+        for i in range(len(laser.scans.t_s)):
+            yield _scan(r, m, laser, i)
+
+
+def _stamps(r: Recording) -> se2.Array:
+    """(N,) what the stamps of the first laser's scans say, s since the start."""
+    return r.scans.t_s + r.scenario.scan_late_s
+
+
+def _arrival_s(laser: _Laser) -> float:
+    return laser.lidar.time_increment_s * (laser.lidar.beams - 1) + _SCAN_LATE
+
+
+def _scan(r: Recording, m: Messages, laser: _Laser, i: int) -> Record:
+    lidar, t_s = laser.lidar, laser.scans.t_s[i]
+    bearings = lidar.bearings
+    message = m.make(
+        "sensor_msgs/LaserScan",
+        header=m.header(_ns(t_s + r.scenario.scan_late_s), laser.frame),
+        angle_min=float(bearings[0]),
+        angle_max=float(bearings[-1]),
+        angle_increment=float(bearings[1] - bearings[0]),
+        time_increment=lidar.time_increment_s,
+        scan_time=1.0 / lidar.rate_hz,
+        range_min=lidar.range_min_m,
+        range_max=lidar.range_max_m,
+        ranges=laser.scans.ranges[i],
+        intensities=np.empty(0, dtype=np.float32),
+    )
+    return Record(_ns(t_s + _arrival_s(laser)), laser.topic, "sensor_msgs/LaserScan", message)
 
 
 def _navigator(r: Recording, m: Messages) -> Iterator[Record]:
@@ -179,6 +227,8 @@ def _believed_plan(r: Recording, phase: Phase) -> se2.Array:
 
 
 def _costmaps(r: Recording, m: Messages) -> Iterator[Record]:
+    if "odometry" in r.scenario.without:
+        return
     base = odometry_at(r.odometry, r.scans.t_s)
     every = round(r.scenario.lidar.rate_hz)
     for i in range(0, len(r.scans.t_s), every):

@@ -93,6 +93,27 @@ def rasterise(world: World, resolution_m: float, *, as_map: bool) -> OccupancyGr
     return OccupancyGrid(cells, resolution_m, np.array([x0, y0, 0.0]))
 
 
+def redrawn(grid: OccupancyGrid, xyyaw_to_from: se2.Array) -> OccupancyGrid:
+    """A map drawn again in another frame, its rows along that frame's x axis.
+
+    Args:
+        grid: the map.
+        xyyaw_to_from: (3,) the map's own frame in the new one.
+    """
+    height, width = grid.cells.shape
+    corners = grid.centre_of(np.array([[0, 0], [0, width], [height, 0], [height, width]]))
+    corners = se2.transform_points(xyyaw_to_from, corners)
+    low = np.floor(corners.min(axis=0) / grid.resolution_m) * grid.resolution_m
+    shape = np.ceil((corners.max(axis=0) - low) / grid.resolution_m).astype(np.int64)[::-1]
+    new = OccupancyGrid(np.full(shape, UNKNOWN, np.int8), grid.resolution_m, np.array([*low, 0.0]))
+    centres = new.centre_of(np.indices(shape).reshape(2, -1).T)
+    old = grid.cell_of(se2.transform_points(se2.inverse(xyyaw_to_from), centres))
+    inside = grid.inside(old)
+    cells = np.full(len(old), UNKNOWN, dtype=np.int8)
+    cells[inside] = grid.cells[old[inside, 0], old[inside, 1]]
+    return OccupancyGrid(cells.reshape(shape), grid.resolution_m, new.origin_xyyaw)
+
+
 def room_walls(name: str, bounds: tuple[float, float, float, float]) -> tuple[Solid, ...]:
     """Four walls around a rectangle, outside of it."""
     x0, y0, x1, y1 = bounds

@@ -1,0 +1,1 @@
+"""The public benchmark: simulated incidents from seeds, judged, and scored against the truth."""

@@ -1,0 +1,102 @@
+"""Incidents from seeds: a random place, a random tour, and one thing that goes wrong.
+
+The same kind, seed and conditions give the same incident. What a kind is called is what was done;
+what the log then shows (a filter may recover) is said by `slamreplay.bench.truth` alone.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from slamreplay.bench import faults
+from slamreplay.bench.conditions import CONDITIONS, conditioned, world_of
+from slamreplay.bench.crowds import crowd
+from slamreplay.errors import UsageError
+from slamreplay.simulate.drive import drive
+from slamreplay.simulate.recording import Recording, record
+from slamreplay.simulate.routes import Floor
+from slamreplay.simulate.scenarios import Scenario
+
+#: What can go wrong, healthy ones first.
+KINDS: tuple[str, ...] = (
+    "healthy",
+    "people",
+    "wrong_start",
+    "wheel_slip",
+    "push",
+    "kidnapped",
+    "identical_aisles",
+    "overconfident",
+    "late_stamps",
+    "dropped_scans",
+    "boxes_added",
+    "racks_removed",
+    "racks_moved",
+    "half_changed",
+    "lost_in_changed",
+    "map_frame",
+    "wrong_map",
+)
+#: Logs last this long, s; the robot never comes nearer than that to anything, m.
+_SHORTEST_S, _LONGEST_S, _LEAST_CLEAR_M = 58.0, 120.0, 0.27
+_ATTEMPTS = 40
+
+
+@dataclass(frozen=True, eq=False)
+class Incident:
+    """One simulated log and what was done to it.
+
+    Attributes:
+        kind: one of `KINDS`.
+        seed: the seed it was made from.
+        recording: everything a log is made of.
+        conditions: of `slamreplay.bench.conditions.CONDITIONS`.
+    """
+
+    kind: str
+    seed: int
+    recording: Recording
+    conditions: tuple[str, ...] = ()
+
+
+def incident(kind: str, seed: int, conditions: tuple[str, ...] = ()) -> Incident:
+    """Make one.
+
+    Raises:
+        UsageError: there is no such kind or condition.
+    """
+    if kind not in KINDS:
+        raise UsageError(f"there is no kind of incident '{kind}'", hint=", ".join(KINDS))
+    for name in conditions:
+        if name not in CONDITIONS:
+            raise UsageError(f"there is no condition '{name}'", hint=", ".join(CONDITIONS))
+    for attempt in range(_ATTEMPTS):
+        rng = np.random.Generator(np.random.PCG64([seed, KINDS.index(kind), attempt]))
+        story = _story(kind, rng, conditions)
+        if story is not None:
+            return Incident(kind, seed, record(story), conditions)
+    raise AssertionError(f"no {kind} incident of seed {seed} can be driven")
+
+
+def _story(kind: str, rng: np.random.Generator, conditions: tuple[str, ...]) -> Scenario | None:
+    """One try: None where the tour comes too near to something or lasts too long or short."""
+    place = world_of(kind, rng, conditions)
+    floor = Floor.of(place.world)
+    story = faults.on_tour(kind, place, floor, rng)
+    if story is None:
+        return None
+    motion = drive(story.start, story.tour)
+    if not _SHORTEST_S <= motion.t_s[-1] <= _LONGEST_S:
+        return None
+    story = faults.on_structure(kind, story, motion, rng)
+    driven = motion.xyyaw[:, :2]
+    if Floor.of(story.mapped, story.standing).at(driven).min() < _LEAST_CLEAR_M:
+        return None
+    story = faults.on_sensing(kind, story, motion, rng)
+    story = conditioned(story, rng, conditions)
+    many = kind == "people" or "crowd" in conditions
+    n = int(rng.integers(12, 25)) if many else int(rng.integers(0, 4))
+    people = crowd(floor, motion, n, rng)
+    return replace(story, walkers=people, seed=int(rng.integers(2**31)))
