@@ -1,6 +1,8 @@
-"""Which beams contradict the map, when cast from where the robot really was."""
+"""What each beam says of the map, when cast from where the robot really was."""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
@@ -8,62 +10,68 @@ from numpy.typing import NDArray
 
 from slamreplay.geometry import se2
 from slamreplay.hindsight.beams import HIT, INVALID, Beams
+from slamreplay.matching.field import WorkingMap
 
-UNCHANGED, APPEARED, REMOVED = 0, 1, 2
-#: Bits of a cell: mapped wall, not mapped, new structure stands here, something stands near.
-WALL, UNKNOWN, NEW, SUPPORTED = 1, 2, 4, 8
+#: What a beam says: nothing, that its wall is there, that something is before it, that it is gone.
+SILENT, MET, NEARER, BEYOND = 0, 1, 2, 3
+#: A beam has changed, and structure is elsewhere, beyond this distance.
+BEYOND_M = 0.25
+_WALL, _UNKNOWN = 1, 2
 
 
-def changed_beams(
-    cells: NDArray[np.uint8],
-    cell_m: float,
-    corner_xy: se2.Array,
-    beams: Beams,
-    poses: se2.Array,
-    beyond_m: float,
-) -> tuple[NDArray[np.int8], NDArray[np.int32]]:
-    """What each beam says of the map.
+@dataclass(frozen=True, eq=False)
+class BeamsOnMap:
+    """Beams against the map alone; which of them are changes takes more than one beam to say.
 
-    A beam is APPEARED where it ends on new structure, farther than `beyond_m` before any mapped
-    wall; REMOVED where it goes on beyond the wall that should have stopped it by more than that,
-    and nothing stands near the place. Beams that meet unmapped cells first are unchanged, and so
-    are those along a wall: there a small error of the pose moves the expected end by metres.
+    Attributes:
+        says: (N, B) int8 SILENT, MET, NEARER or BEYOND. Beams that meet unmapped cells first are
+            silent.
+        where: (N, B) int32 flat index of the working map's cell: the wall that was met or passed,
+            or the end of a beam that was nearer; -1 of a silent one.
+        is_sure: (N, B) BEYOND, and its neighbours to both sides should have been stopped as well:
+            along a wall and at its corners a small error of the pose moves the end by metres.
+        wall_m: (N, B) float32 distance to the wall that the map expects, NaN without one in reach.
+    """
+
+    says: NDArray[np.int8]
+    where: NDArray[np.int32]
+    is_sure: NDArray[np.bool_]
+    wall_m: NDArray[np.float32]
+
+
+def on_map(working: WorkingMap, beams: Beams, poses: se2.Array) -> BeamsOnMap:
+    """Every beam laid over the map.
 
     Args:
-        cells: (H, W) bits of each cell.
-        cell_m: edge of a cell.
-        corner_xy: (2,) corner of cell (0, 0) in the grid's frame, m.
+        working: the map.
         beams: the scans.
-        poses: (N, 3) of the base in the grid's frame; NaN rows are skipped.
-        beyond_m: how much is a difference.
-
-    Returns:
-        (N, B) UNCHANGED, APPEARED or REMOVED; (N, B) flat index of the cell that changed, or -1.
+        poses: (N, 3) of the base in the grid's frame; NaN rows stay silent.
     """
-    change = np.full(beams.kind.shape, UNCHANGED, dtype=np.int8)
+    cells = _WALL * working.walls.astype(np.uint8) | _UNKNOWN * working.unknown.astype(np.uint8)
+    says = np.full(beams.kind.shape, SILENT, dtype=np.int8)
     where = np.full(beams.kind.shape, -1, dtype=np.int32)
-    poses = np.ascontiguousarray(poses)
-    _classify(
+    is_sure = np.zeros(beams.kind.shape, dtype=bool)
+    wall_m = np.full(beams.kind.shape, np.nan, dtype=np.float32)
+    _lay_over(
         cells,
-        cell_m,
-        corner_xy,
+        working.resolution_m,
+        working.corner_xy,
         beams.ends,
         beams.kind,
         beams.laser_xy,
-        poses,
-        beyond_m,
-        change,
-        where,
+        np.ascontiguousarray(poses),
+        BEYOND_M / working.resolution_m,
+        (says, where, is_sure, wall_m),
     )
-    return change, where
+    return BeamsOnMap(says, where, is_sure, wall_m)
 
 
 @njit(cache=True)
-def _classify(  # type: ignore[no-untyped-def]  # noqa: C901
-    cells, cell, corner, ends, kind, laser, poses, beyond_m, change, where
+def _lay_over(  # type: ignore[no-untyped-def]  # noqa: C901
+    cells, cell, corner, ends, kind, laser, poses, beyond, out
 ):
+    says, where, is_sure, wall_m = out
     height, width = cells.shape
-    beyond = beyond_m / cell
     for s in range(poses.shape[0]):
         if not np.isfinite(poses[s, 0]):
             continue
@@ -80,38 +88,38 @@ def _classify(  # type: ignore[no-untyped-def]  # noqa: C901
             if length <= 0.0:
                 continue
             dx, dy = dx / length, dy / length
-            wall = to_wall(cells, ox, oy, dx, dy, length + beyond, beyond)
+            wall = _to_wall(cells, ox, oy, dx, dy, length + beyond, beyond)
             if wall < 0.0:
                 continue
-            if kind[s, b] == HIT and wall > length + beyond:
-                col, row = int(np.floor(ox + dx * length)), int(np.floor(oy + dy * length))
-                if 0 <= row < height and 0 <= col < width and cells[row, col] & NEW:
-                    change[s, b], where[s, b] = APPEARED, row * width + col
-            elif wall + beyond < length:
-                col = int(np.floor(ox + dx * (wall + 1e-6)))
-                row = int(np.floor(oy + dy * (wall + 1e-6)))
-                if not (0 <= row < height and 0 <= col < width) or cells[row, col] & SUPPORTED:
-                    continue
-                # Only a beam whose neighbours to both sides should have been stopped as well.
-                angle = 0.01 + 0.08 / (wall * cell + 0.1)
-                ca, sa = np.cos(angle), np.sin(angle)
-                # A wall met at more than 70 degrees from its normal sends too little back for
-                # "no return" to mean that it is gone.
-                slant = 2.75 * angle * wall if kind[s, b] != HIT else np.inf
-                stopped = True
-                for k in range(2):
-                    tilt = sa if k else -sa
-                    side = to_wall(
-                        cells, ox, oy, ca * dx - tilt * dy, tilt * dx + ca * dy, length, beyond
-                    )
-                    stopped = stopped and side >= 0.0 and side + beyond < length
-                    stopped = stopped and abs(side - wall) <= slant + 1.0
-                if stopped:
-                    change[s, b], where[s, b] = REMOVED, row * width + col
+            if wall < np.inf:
+                wall_m[s, b] = wall * cell
+            is_nearer = wall > length + beyond
+            reach = length if is_nearer else wall + 1e-6
+            col, row = int(np.floor(ox + dx * reach)), int(np.floor(oy + dy * reach))
+            if not (0 <= row < height and 0 <= col < width):
+                continue
+            if is_nearer or abs(length - wall) <= beyond:
+                if kind[s, b] == HIT:
+                    says[s, b] = NEARER if is_nearer else MET
+                    where[s, b] = row * width + col
+                continue
+            says[s, b], where[s, b] = BEYOND, row * width + col
+            angle = 0.01 + 0.08 / (wall * cell + 0.1)
+            ca, sa = np.cos(angle), np.sin(angle)
+            # A wall met at more than 70 degrees from its normal sends too little back for "no
+            # return" to mean that it is gone.
+            slant = 2.75 * angle * wall if kind[s, b] != HIT else np.inf
+            is_sure[s, b] = True
+            for tilt in (sa, -sa):
+                side = _to_wall(
+                    cells, ox, oy, ca * dx - tilt * dy, tilt * dx + ca * dy, length, beyond
+                )
+                if not (0.0 <= side < length - beyond) or abs(side - wall) > slant + 1.0:
+                    is_sure[s, b] = False
 
 
 @njit(cache=True)
-def to_wall(cells, x, y, dx, dy, limit, seam):  # type: ignore[no-untyped-def]
+def _to_wall(cells, x, y, dx, dy, limit, seam):  # type: ignore[no-untyped-def]
     """Distance in cells to the first wall, inf where none is within `limit`, -1 if unmapped first.
 
     A mapper leaves thin unmapped seams before walls: one thinner than `seam` does not count. Beyond
@@ -127,9 +135,9 @@ def to_wall(cells, x, y, dx, dy, limit, seam):  # type: ignore[no-untyped-def]
     travelled, unmapped = 0.0, np.inf
     while travelled <= limit:
         inside = 0 <= row < height and 0 <= col < width
-        if inside and cells[row, col] & WALL:
+        if inside and cells[row, col] & _WALL:
             return travelled if travelled - unmapped <= seam or unmapped == np.inf else -1.0
-        if unmapped == np.inf and (not inside or cells[row, col] & UNKNOWN):
+        if unmapped == np.inf and (not inside or cells[row, col] & _UNKNOWN):
             unmapped = travelled
         if travelled - unmapped > seam:
             return -1.0

@@ -4,33 +4,19 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import binary_dilation, distance_transform_edt, label
+from scipy.ndimage import binary_dilation, distance_transform_edt, maximum_filter, minimum_filter
 
-from slamreplay.bundle.products import ChangedRegion, Changes
+from slamreplay.bundle.products import Changes
 from slamreplay.geometry import se2
-from slamreplay.hindsight.beams import INVALID, Beams
-from slamreplay.hindsight.changed_beams import (
-    APPEARED,
-    NEW,
-    REMOVED,
-    SUPPORTED,
-    UNKNOWN,
-    WALL,
-    changed_beams,
-)
-from slamreplay.hindsight.evidence import Evidence, gather
-from slamreplay.hindsight.reach import with_proven_reach
+from slamreplay.hindsight.beams import HIT, INVALID, MISS, Beams
+from slamreplay.hindsight.changed_beams import BEYOND, BEYOND_M, NEARER, SILENT, BeamsOnMap, on_map
+from slamreplay.hindsight.evidence import BIN_S, Lattice, lattice, passes
+from slamreplay.hindsight.gone import GONE_S, Gone, gone
+from slamreplay.hindsight.reach import proven_reach_m
+from slamreplay.hindsight.regions import Contradictions, changed_regions
+from slamreplay.hindsight.standing import asked_cells, standing
 from slamreplay.maps.grid import OccupancyGrid
 from slamreplay.matching.field import WorkingMap
-
-#: A beam has changed, and structure is elsewhere, beyond this distance.
-BEYOND_M = 0.25
-#: Standing: seen for this long in all, and not passed through for more than twice as long.
-STANDING_S, PASSES_PER_HIT = 4.0, 2.0
-#: A mapped wall is gone when beams went through it for this long.
-GONE_S = 1.0
-#: Changed cells nearer than this are one region; regions seen by fewer scans are noise.
-JOIN_M, MIN_VIEWS = 0.3, 5
 
 
 def find_changes(
@@ -45,36 +31,40 @@ def find_changes(
         poses: (N, 3) of the base in the grid's frame, NaN where there is none.
     """
     poses = np.ascontiguousarray(poses)
-    mapped = WALL * working.walls.astype(np.uint8) | UNKNOWN * working.unknown.astype(np.uint8)
-    beams = with_proven_reach(
-        mapped, working.resolution_m, working.corner_xy, beams, poses, BEYOND_M
-    )
-    evidence = gather(working, beams, poses)
-    cells = mapped | _structure_bits(working, evidence)
-    change, where = changed_beams(
-        cells, working.resolution_m, working.corner_xy, beams, poses, BEYOND_M
-    )
+    laid = on_map(working, beams, poses)
+    reach_m = proven_reach_m(beams, laid)
+    blind = (beams.kind == MISS) & (laid.says == BEYOND) & ~(laid.wall_m + BEYOND_M < reach_m)
+    laid.says[blind] = SILENT
+    laid.says[_near_a_wall(working, laid)] = SILENT
+    where = lattice(working, beams.t_ns)
+    slots, count = asked_cells(where, laid)
+    passed = passes(where, beams, poses, reach_m, slots, count)
+    new = standing(where, laid, slots, passed.through)
+    ends = _ends(where, beams, poses)
+    away = gone(where, beams, laid, ends)
+    is_new = _at(where, laid, NEARER, new.slots, new.holds)
+    is_gone = _at(where, laid, BEYOND, away.slots, away.holds)
+
     valid = np.count_nonzero(beams.kind != INVALID, axis=1).astype(np.float64)
     valid[(valid == 0) | ~np.isfinite(poses).all(axis=1)] = np.nan
-    appeared_share = np.count_nonzero(change == APPEARED, axis=1) / valid
-    removed_share = np.count_nonzero(change == REMOVED, axis=1) / valid
-    appeared = _mask(cells, where[change == APPEARED])
-    passed = _fine(working, evidence.pass_s >= GONE_S, evidence.step)
-    removed = _mask(cells, where[change == REMOVED])
-    # What lies behind the first cell of a wall went with it.
-    reach = 2 * round(BEYOND_M / working.resolution_m) + 1
-    with_it = binary_dilation(removed, np.ones((reach, reach), dtype=bool))
-    removed |= with_it & working.walls & passed & ((cells & SUPPORTED) == 0)
-    regions = [
-        region
-        for kind, code, mask in (("appeared", APPEARED, appeared), ("removed", REMOVED, removed))
-        for region in _regions(working, evidence, beams.t_ns, change == code, where, mask, kind)
-    ]
-    regions.sort(key=lambda r: (-r.area_m2, r.bbox_m))
+    appeared_share = np.count_nonzero(is_new, axis=1) / valid
+    removed_share = np.count_nonzero(is_gone, axis=1) / valid
+    appeared = _mask(working, laid.where[is_new])
+    removed = _mask(working, laid.where[is_gone])
+    removed |= _went_with_it(
+        working, where, removed, passed.bin_count, _still_seen(where, beams, ends, away)
+    )
+    new_clear = _clear(working, where, new.slots, new.seen_s, new.through_s)
+    gone_clear = _clear(working, where, away.slots, away.through_s, away.seen_s)
+    regions = changed_regions(
+        working,
+        Contradictions("appeared", appeared, is_new, laid.where, beams.t_ns, new_clear),
+        Contradictions("removed", removed, is_gone, laid.where, beams.t_ns, gone_clear),
+    )
     return Changes(
         _to_grid(grid, working, appeared),
         _to_grid(grid, working, removed) & grid.occupied,
-        tuple(regions),
+        regions,
         beams.t_ns,
         appeared_share + removed_share,
         appeared_share,
@@ -82,73 +72,92 @@ def find_changes(
     )
 
 
-def _structure_bits(working: WorkingMap, evidence: Evidence) -> NDArray[np.uint8]:
-    """(H, W) what stands where, from what was seen and seen through."""
-    hit_s, pass_s = evidence.hit_s, evidence.pass_s
-    standing = (hit_s >= STANDING_S) & (pass_s <= PASSES_PER_HIT * hit_s)
-    near = binary_dilation(standing, np.ones((3, 3), dtype=bool))
+def _near_a_wall(working: WorkingMap, laid: BeamsOnMap) -> NDArray[np.bool_]:
+    """(N, B) beams that end before their wall, but so near to another one that it explains them."""
     apart_m = distance_transform_edt(~working.walls) * working.resolution_m
-    # A mapped wall counts as there as soon as more was seen on it than through it: far walls and
-    # dark ones are hit too seldom to be called standing.
-    seen = standing | ((hit_s > 0.0) & (hit_s >= 0.5 * pass_s))
-    seen = _fine(working, seen, evidence.step)
-    seen_m = distance_transform_edt(~seen) * working.resolution_m if seen.any() else np.inf
-    bits = np.zeros(working.walls.shape, dtype=np.uint8)
-    bits |= NEW * (_fine(working, near, evidence.step) & (apart_m > BEYOND_M)).astype(np.uint8)
-    bits |= SUPPORTED * np.broadcast_to(seen_m <= BEYOND_M, bits.shape).astype(np.uint8)
-    return bits
+    return (laid.says == NEARER) & (apart_m.ravel()[laid.where] <= BEYOND_M)
 
 
-def _fine(working: WorkingMap, mask: NDArray[np.bool_], step: int) -> NDArray[np.bool_]:
-    height, width = working.walls.shape
-    return np.repeat(np.repeat(mask, step, axis=0), step, axis=1)[:height, :width]
+def _ends(where: Lattice, beams: Beams, poses: se2.Array) -> NDArray[np.int64]:
+    """(K,) flat evidence cell of the end of each hit, -1 outside the map or without a pose."""
+    hit = beams.kind == HIT
+    pose = np.broadcast_to(poses[:, None, :], (*hit.shape, 3))[hit]
+    ends = beams.ends[hit].astype(np.float64)
+    cos, sin = np.cos(pose[:, 2]), np.sin(pose[:, 2])
+    x = pose[:, 0] + cos * ends[:, 0] - sin * ends[:, 1]
+    y = pose[:, 1] + sin * ends[:, 0] + cos * ends[:, 1]
+    height, width = where.shape
+    with np.errstate(invalid="ignore"):
+        col = np.floor((x - where.corner_xy[0]) / where.cell_m)
+        row = np.floor((y - where.corner_xy[1]) / where.cell_m)
+        inside = (row >= 0) & (row < height) & (col >= 0) & (col < width)
+        flat = np.where(inside, row * width + col, -1.0)
+    return flat.astype(np.int64)
 
 
-def _mask(cells: NDArray[np.uint8], index: NDArray[np.int32]) -> NDArray[np.bool_]:
-    mask = np.zeros(cells.size, dtype=bool)
+def _at(
+    where: Lattice,
+    laid: BeamsOnMap,
+    says: int,
+    slots: NDArray[np.int32],
+    holds: NDArray[np.bool_],
+) -> NDArray[np.bool_]:
+    """(N, B) beams that say so of a cell of which it holds at their time."""
+    scan, beam = np.nonzero(laid.says == says)
+    slot = slots.ravel()[where.cells_of(laid.where[scan, beam])]
+    true = slot >= 0
+    true[true] = holds[slot[true], where.bins[scan[true]]]
+    out = np.zeros(laid.says.shape, dtype=bool)
+    out[scan[true], beam[true]] = True
+    return out
+
+
+def _mask(working: WorkingMap, index: NDArray[np.int32]) -> NDArray[np.bool_]:
+    mask = np.zeros(working.walls.size, dtype=bool)
     mask[index] = True
-    return mask.reshape(cells.shape)
+    return mask.reshape(working.walls.shape)
 
 
-def _regions(
+def _still_seen(
+    where: Lattice, beams: Beams, ends: NDArray[np.int64], away: Gone
+) -> NDArray[np.bool_]:
+    """(H, W) evidence cells near which something is seen after the walls about them were gone."""
+    last = np.full(where.shape, -1, dtype=np.int32)
+    at = ends >= 0
+    bins = np.broadcast_to(where.bins[:, None], beams.kind.shape)[beams.kind == HIT][at]
+    np.maximum.at(last.ravel(), ends[at], bins)
+    since = np.full(where.shape, where.bin_count, dtype=np.int32)
+    slots = away.slots >= 0
+    first = np.where(away.holds.any(axis=1), away.holds.argmax(axis=1), where.bin_count)
+    since[slots] = first[away.slots[slots]]
+    reach = 2 * round(BEYOND_M / where.cell_m) + 1
+    return maximum_filter(last, reach) > minimum_filter(since, reach)
+
+
+def _went_with_it(
     working: WorkingMap,
-    evidence: Evidence,
-    t_ns: NDArray[np.int64],
-    changed: NDArray[np.bool_],
-    where: NDArray[np.int32],
-    mask: NDArray[np.bool_],
-    kind: str,
-) -> list[ChangedRegion]:
-    reach = max(1, round(0.5 * JOIN_M / working.resolution_m))
-    labels, count = label(binary_dilation(mask, np.ones((2 * reach + 1,) * 2, dtype=bool)))
-    scan, beam = np.nonzero(changed)
-    of_beam = labels.ravel()[where[scan, beam]]
-    found = []
-    for number in range(1, count + 1):
-        scans = np.unique(scan[of_beam == number])
-        if len(scans) < MIN_VIEWS:
-            continue
-        rows, cols = np.nonzero(mask & (labels == number))
-        corner = working.corner_xy
-        low = corner + np.array([cols.min(), rows.min()]) * working.resolution_m
-        high = corner + np.array([cols.max() + 1, rows.max() + 1]) * working.resolution_m
-        box = np.array([[low[0], low[1]], [high[0], low[1]], [low[0], high[1]], [high[0], high[1]]])
-        box = se2.transform_points(working.origin_xyyaw, box)
-        hit = evidence.hit_s[rows // evidence.step, cols // evidence.step].sum()
-        gone = evidence.pass_s[rows // evidence.step, cols // evidence.step].sum()
-        clear = (hit if kind == "appeared" else gone) / max(float(hit + gone), 1e-9)
-        found.append(
-            ChangedRegion(
-                "appeared" if kind == "appeared" else "removed",
-                (*box.min(axis=0).tolist(), *box.max(axis=0).tolist()),
-                len(rows) * working.resolution_m**2,
-                int(t_ns[scans[0]]),
-                int(t_ns[scans[-1]]),
-                len(scans),
-                float(clear * (1.0 - np.exp(-len(scans) / 10.0))),
-            )
-        )
-    return found
+    where: Lattice,
+    removed: NDArray[np.bool_],
+    pass_bins: NDArray[np.uint16],
+    still_seen: NDArray[np.bool_],
+) -> NDArray[np.bool_]:
+    """(H, W) walls that went with the first cells that beams met: those behind them, passed too."""
+    reach = 2 * round(BEYOND_M / working.resolution_m) + 1
+    beside = binary_dilation(removed, np.ones((reach, reach), dtype=bool))
+    empty = (pass_bins * BIN_S >= GONE_S) & ~still_seen
+    return beside & working.walls & where.fine(empty, working.walls.shape)
+
+
+def _clear(
+    working: WorkingMap,
+    where: Lattice,
+    slots: NDArray[np.int32],
+    for_s: NDArray[np.float64],
+    against_s: NDArray[np.float64],
+) -> se2.Array:
+    """(H, W) share of the time for which a cell was seen as the change says."""
+    share = np.append(for_s / np.maximum(for_s + against_s, 1e-9), 1.0)
+    return where.fine(share[slots], working.walls.shape)
 
 
 def _to_grid(

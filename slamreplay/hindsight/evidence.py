@@ -1,4 +1,4 @@
-"""What the beams, replayed from the hindsight poses, say of each cell: stood there, was empty."""
+"""When each cell was seen, and when it was seen through: evidence over time on a coarse lattice."""
 
 from __future__ import annotations
 
@@ -9,89 +9,184 @@ from numba import njit
 from numpy.typing import NDArray
 
 from slamreplay.geometry import se2
-from slamreplay.hindsight.beams import HIT, INVALID, Beams
+from slamreplay.hindsight.beams import INVALID, MISS, Beams
 from slamreplay.matching.field import WorkingMap
 
-CELL_M = 0.1
-#: Two observations of a cell farther apart in time than this do not tell what was in between.
-GAP_S = 1.0
+CELL_M, BIN_S = 0.1, 0.5
 #: A pass counts up to this distance before the beam's end: noise puts ends short.
 SHORT_M = 0.2
 
 
 @dataclass(frozen=True, eq=False)
-class Evidence:
-    """Observed time per evidence cell, which is `step` x `step` cells of the working map.
+class Lattice:
+    """Evidence cells, `step` x `step` cells of the working map each, and bins of time.
 
     Attributes:
-        hit_s: (H, W) seconds for which something was seen there.
-        pass_s: (H, W) seconds for which beams went through.
+        shape: rows and columns.
         step: working map cells along an edge.
+        width: columns of the working map.
+        cell_m: edge of an evidence cell.
+        corner_xy: (2,) corner of cell (0, 0) in the grid's frame, m.
+        bins: (N,) int32 bin of each scan.
     """
 
-    hit_s: NDArray[np.float32]
-    pass_s: NDArray[np.float32]
+    shape: tuple[int, int]
     step: int
+    width: int
+    cell_m: float
+    corner_xy: se2.Array
+    bins: NDArray[np.int32]
+
+    @property
+    def bin_count(self) -> int:
+        """T, the number of bins."""
+        return int(self.bins[-1]) + 1 if len(self.bins) else 0
+
+    def cells_of(self, where: NDArray[np.int32]) -> NDArray[np.int64]:
+        """Flat evidence cells of flat working map cells."""
+        row, col = np.divmod(where.astype(np.int64), self.width)
+        return np.asarray(row // self.step * self.shape[1] + col // self.step)
+
+    def fine(self, mask: NDArray, shape: tuple[int, ...]) -> NDArray:
+        """Values of the lattice on the working map of that shape."""
+        whole = np.repeat(np.repeat(mask, self.step, axis=0), self.step, axis=1)
+        return whole[: shape[0], : shape[1]]
 
 
-def gather(working: WorkingMap, beams: Beams, poses: se2.Array) -> Evidence:
-    """Evidence of all scans with a pose (N, 3) in the grid's frame."""
+def lattice(working: WorkingMap, t_ns: NDArray[np.int64]) -> Lattice:
+    """The lattice over a map, and over the times (N,) of its scans, ascending."""
     step = max(1, round(CELL_M / working.resolution_m))
-    height, width = (-(-n // step) for n in working.walls.shape)
-    hit_s, pass_s = np.zeros((2, height, width), dtype=np.float32)
-    cell = step * working.resolution_m
-    _gather(
-        hit_s,
-        pass_s,
-        cell,
-        working.corner_xy,
-        (beams.t_ns - beams.t_ns[0]) / 1e9,
-        beams.ends,
-        beams.kind,
-        beams.laser_xy,
-        poses,
-        np.full(hit_s.shape, -1e9),
-        np.full(hit_s.shape, -1e9),
-    )
-    return Evidence(hit_s, pass_s, step)
+    rows, cols = (-(-n // step) for n in working.walls.shape)
+    bins = ((t_ns - t_ns[0]) // round(BIN_S * 1e9)).astype(np.int32)
+    cell_m = step * working.resolution_m
+    return Lattice((rows, cols), step, working.walls.shape[1], cell_m, working.corner_xy, bins)
+
+
+def marks(
+    where: Lattice,
+    cells: NDArray[np.int64],
+    bins: NDArray[np.int32],
+    slots: NDArray[np.int32],
+    radius: int,
+    count: int,
+) -> NDArray[np.bool_]:
+    """(count, T) whether something was seen within `radius` cells of each slot in each bin.
+
+    Args:
+        where: the lattice.
+        cells: (K,) flat cells where beams ended.
+        bins: (K,) when.
+        slots: (H, W) number of each cell that is asked for, -1 of the others.
+        radius: in cells, 0 for the cell alone.
+        count: how many are asked for.
+    """
+    total = where.bin_count
+    out = np.zeros((count, total), dtype=bool)
+    flat = np.unique(cells * total + bins)
+    _spread(out, flat // total, flat % total, slots, radius)
+    return out
 
 
 @njit(cache=True)
-def _gather(  # type: ignore[no-untyped-def]  # noqa: C901
-    hit_s, pass_s, cell, corner, t, ends, kind, laser, poses, last_hit, last_pass
+def _spread(out, cells, bins, slots, radius):  # type: ignore[no-untyped-def]
+    height, width = slots.shape
+    for k in range(cells.shape[0]):
+        row, col = cells[k] // width, cells[k] % width
+        for r in range(max(0, row - radius), min(height, row + radius + 1)):
+            for c in range(max(0, col - radius), min(width, col + radius + 1)):
+                far = (r - row) * (r - row) + (c - col) * (c - col)
+                if slots[r, c] >= 0 and far <= radius * radius + radius:
+                    out[slots[r, c], bins[k]] = True
+
+
+@dataclass(frozen=True, eq=False)
+class Passes:
+    """Beams that went through.
+
+    Attributes:
+        through: (C, T) of the cells asked for, in which bins.
+        last: (H, W) int32 index of the last scan that went through each cell, -1 for none.
+        bin_count: (H, W) uint16 in how many bins.
+    """
+
+    through: NDArray[np.bool_]
+    last: NDArray[np.int32]
+    bin_count: NDArray[np.uint16]
+
+
+def passes(
+    where: Lattice,
+    beams: Beams,
+    poses: se2.Array,
+    reach_m: float,
+    slots: NDArray[np.int32],
+    count: int,
+) -> Passes:
+    """All cells that beams went through, from poses (N, 3) in the grid's frame.
+
+    Args:
+        where: the lattice.
+        beams: the scans.
+        poses: NaN rows are skipped.
+        reach_m: a beam without a return proves nothing beyond this.
+        slots: (H, W) number of each cell that is asked for, -1 of the others.
+        count: how many are asked for.
+    """
+    through = np.zeros((count, where.bin_count), dtype=bool)
+    last = np.full(where.shape, -1, dtype=np.int32)
+    last_bin = np.full(where.shape, -1, dtype=np.int32)
+    bin_count = np.zeros(where.shape, dtype=np.uint16)
+    _passes(
+        where.cell_m,
+        where.corner_xy,
+        where.bins,
+        beams.ends,
+        beams.kind,
+        beams.laser_xy,
+        np.ascontiguousarray(poses),
+        reach_m / where.cell_m,
+        slots,
+        (through, last, last_bin, bin_count),
+    )
+    return Passes(through, last, bin_count)
+
+
+@njit(cache=True)
+def _passes(  # type: ignore[no-untyped-def]  # noqa: C901
+    cell, corner, bins, ends, kind, laser, poses, reach, slots, out
 ):
-    height, width = hit_s.shape
+    through, last, last_bin, bin_count = out
+    height, width = last.shape
     for s in range(poses.shape[0]):
         if not np.isfinite(poses[s, 0]):
             continue
-        cos, sin, now = np.cos(poses[s, 2]), np.sin(poses[s, 2]), t[s]
+        cos, sin, now = np.cos(poses[s, 2]), np.sin(poses[s, 2]), bins[s]
         px, py = (poses[s, 0] - corner[0]) / cell, (poses[s, 1] - corner[1]) / cell
         ox = px + (cos * laser[0] - sin * laser[1]) / cell
         oy = py + (sin * laser[0] + cos * laser[1]) / cell
-        for hits in (True, False):
-            for b in range(ends.shape[1]):
-                if kind[s, b] == INVALID or (hits and kind[s, b] != HIT):
+        for b in range(ends.shape[1]):
+            if kind[s, b] == INVALID:
+                continue
+            dx = px + (cos * ends[s, b, 0] - sin * ends[s, b, 1]) / cell - ox
+            dy = py + (sin * ends[s, b, 0] + cos * ends[s, b, 1]) / cell - oy
+            length = np.sqrt(dx * dx + dy * dy)
+            if length <= 0.0:
+                continue
+            dx, dy = 0.5 * dx / length, 0.5 * dy / length
+            free = length - SHORT_M / cell
+            if kind[s, b] == MISS:
+                free = min(free, reach)
+            x, y = ox, oy
+            # Half a cell a step may skip a corner that the ray only grazes, and no more.
+            for _ in range(int(2.0 * free)):
+                col, row, behind = int(x), int(y), x < 0.0 or y < 0.0
+                x += dx
+                y += dy
+                if behind or row >= height or col >= width or last[row, col] == s:
                     continue
-                ex = px + (cos * ends[s, b, 0] - sin * ends[s, b, 1]) / cell
-                ey = py + (sin * ends[s, b, 0] + cos * ends[s, b, 1]) / cell
-                if hits:
-                    col, row = int(np.floor(ex)), int(np.floor(ey))
-                    if 0 <= row < height and 0 <= col < width and last_hit[row, col] < now:
-                        gap = now - last_hit[row, col]
-                        if gap <= GAP_S:
-                            hit_s[row, col] += gap
-                        last_hit[row, col] = now
-                    continue
-                dx, dy = ex - ox, ey - oy
-                length = np.sqrt(dx * dx + dy * dy)
-                # Half a cell a step may skip a corner that the ray only grazes, and no more.
-                for i in range(int(2.0 * (length - SHORT_M / cell))):
-                    part = 0.5 * i / length
-                    col, row = int(np.floor(ox + part * dx)), int(np.floor(oy + part * dy))
-                    if 0 <= row < height and 0 <= col < width:
-                        if last_hit[row, col] == now or last_pass[row, col] == now:
-                            continue
-                        gap = now - last_pass[row, col]
-                        if gap <= GAP_S:
-                            pass_s[row, col] += gap
-                        last_pass[row, col] = now
+                last[row, col] = s
+                if last_bin[row, col] != now:
+                    last_bin[row, col] = now
+                    bin_count[row, col] += 1
+                    if slots[row, col] >= 0:
+                        through[slots[row, col], now] = True

@@ -1,0 +1,161 @@
+"""Changed cells that belong together, and what was carried from one place to another."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import binary_dilation, label
+from scipy.spatial import cKDTree
+
+from slamreplay.bundle.products import ChangedRegion
+from slamreplay.geometry import se2
+from slamreplay.matching.field import WorkingMap
+
+#: Changed cells nearer than this are one region; regions seen by fewer scans are noise.
+JOIN_M, MIN_VIEWS = 0.3, 5
+#: Two regions are one thing that moved if this share of what appeared lies on the outline of what
+#: is gone, this near, once laid over it; and if that covers this share of the outline.
+ALIKE_SHARE, ALIKE_M, COVERED_SHARE = 0.9, 0.12, 0.35
+#: Their lengths differ by no more than this, m; smaller things look all alike.
+LENGTH_M, SMALLEST_M = 0.3, 0.3
+
+
+@dataclass(frozen=True, eq=False)
+class Contradictions:
+    """Beams that contradict the map in one way.
+
+    Attributes:
+        kind: what the map lacks, or has too much.
+        mask: (H, W) changed cells of the working map.
+        changed: (N, B) the beams.
+        where: (N, B) flat cell of the working map each of them changed.
+        t_ns: (N,) times of the scans.
+        clear: (H, W) share of the time for which each cell was seen as this says, 0 to 1.
+    """
+
+    kind: Literal["appeared", "removed"]
+    mask: NDArray[np.bool_]
+    changed: NDArray[np.bool_]
+    where: NDArray[np.int32]
+    t_ns: NDArray[np.int64]
+    clear: se2.Array
+
+
+@dataclass(frozen=True, eq=False)
+class _Patch:
+    region: ChangedRegion
+    cells_m: se2.Array  # (K, 2) centres of its cells in the grid's frame
+
+
+def changed_regions(
+    working: WorkingMap, appeared: Contradictions, removed: Contradictions
+) -> tuple[ChangedRegion, ...]:
+    """Regions, largest first; a removed and an appeared one of the same shape are one that moved.
+
+    Args:
+        working: the map.
+        appeared: beams that end before mapped walls, and the cells they end in.
+        removed: beams that go through mapped walls, and those walls.
+    """
+    new, old = _patches(working, appeared), _patches(working, removed)
+    pairs = _pairs(new, old)
+    regions = [_moved(new[i].region, old[j].region, alike) for i, j, alike in pairs]
+    regions += [p.region for i, p in enumerate(new) if i not in {pair[0] for pair in pairs}]
+    regions += [p.region for j, p in enumerate(old) if j not in {pair[1] for pair in pairs}]
+    return tuple(sorted(regions, key=lambda r: (-r.area_m2, r.bbox_m, r.kind)))
+
+
+def _patches(working: WorkingMap, found: Contradictions) -> list[_Patch]:
+    reach = max(1, round(0.5 * JOIN_M / working.resolution_m))
+    labels, count = label(binary_dilation(found.mask, np.ones((2 * reach + 1,) * 2, dtype=bool)))
+    scan, beam = np.nonzero(found.changed)
+    of_beam = labels.ravel()[found.where[scan, beam]]
+    cells = np.argwhere(found.mask)
+    of_cell = labels[tuple(cells.T)]
+    patches = []
+    for number in range(1, count + 1):
+        scans = np.unique(scan[of_beam == number])
+        if len(scans) < MIN_VIEWS:
+            continue
+        own = cells[of_cell == number]
+        low = working.corner_xy + own.min(axis=0)[::-1] * working.resolution_m
+        high = working.corner_xy + (own.max(axis=0)[::-1] + 1) * working.resolution_m
+        box = np.array([[low[0], low[1]], [high[0], low[1]], [low[0], high[1]], [high[0], high[1]]])
+        box = se2.transform_points(working.origin_xyyaw, box)
+        clear = float(found.clear[tuple(own.T)].mean())
+        region = ChangedRegion(
+            found.kind,
+            (*box.min(axis=0).tolist(), *box.max(axis=0).tolist()),
+            len(own) * working.resolution_m**2,
+            int(found.t_ns[scans[0]]),
+            int(found.t_ns[scans[-1]]),
+            len(scans),
+            clear * float(1.0 - np.exp(-len(scans) / 10.0)),
+        )
+        centres = working.corner_xy + (own[:, ::-1] + 0.5) * working.resolution_m
+        patches.append(_Patch(region, centres))
+    return patches
+
+
+def _pairs(new: list[_Patch], old: list[_Patch]) -> list[tuple[int, int, float]]:
+    """Index in `new`, index in `old` and likeness of what moved, each patch at most once."""
+    likeness = np.array([[_alike(a.cells_m, b.cells_m) for b in old] for a in new])
+    pairs: list[tuple[int, int, float]] = []
+    while likeness.size and likeness.max() > 0.0:
+        i, j = np.unravel_index(np.argmax(likeness), likeness.shape)
+        pairs.append((int(i), int(j), float(likeness[i, j])))
+        likeness[i, :], likeness[:, j] = 0.0, 0.0
+    return pairs
+
+
+def _alike(new: se2.Array, old: se2.Array) -> float:
+    """How much two outlines look alike, 0 (not) to 1.
+
+    What was removed is seen on all sides, for beams go through it; of what appeared often only one
+    side is. So the new outline is laid over the old one, corner on corner, in all four headings.
+    """
+    new_box, old_box = _upright(new), _upright(old)
+    new_size, old_size = np.sort(new_box.max(axis=0)), np.sort(old_box.max(axis=0))
+    if new_size[1] < SMALLEST_M or abs(new_size[1] - old_size[1]) > LENGTH_M:
+        return 0.0
+    if new_size[0] > old_size[0] + LENGTH_M:
+        return 0.0
+    outline, best = cKDTree(old_box), 0.0
+    size = old_box.max(axis=0)
+    for quarter in range(4):
+        turned = se2.transform_points(np.array([0.0, 0.0, quarter * np.pi / 2.0]), new_box)
+        turned = turned - turned.min(axis=0)
+        slack = size - turned.max(axis=0)
+        for corner in np.array([[0, 0], [0, 1], [1, 0], [1, 1]]):
+            laid = turned + corner * slack
+            on_it = float(np.mean(outline.query(laid)[0] <= ALIKE_M))
+            covered = float(np.mean(cKDTree(laid).query(old_box)[0] <= ALIKE_M))
+            if on_it >= ALIKE_SHARE and covered >= COVERED_SHARE:
+                best = max(best, on_it * (0.5 + 0.5 * covered))
+    return best
+
+
+def _upright(points: se2.Array) -> se2.Array:
+    """Points (N, 2) turned so that their bounding rectangle is smallest, its corner at 0, 0."""
+    turned = [
+        se2.transform_points(np.array([0.0, 0.0, angle]), points)
+        for angle in np.radians(np.arange(0.0, 90.0, 2.0))
+    ]
+    sizes = np.array([np.ptp(p, axis=0) for p in turned])
+    best = turned[int(np.argmin(np.prod(sizes + 0.05, axis=1)))]
+    return np.asarray(best - best.min(axis=0))
+
+
+def _moved(new: ChangedRegion, old: ChangedRegion, alike: float) -> ChangedRegion:
+    return replace(
+        new,
+        kind="moved",
+        from_bbox_m=old.bbox_m,
+        first_seen_ns=min(new.first_seen_ns, old.first_seen_ns),
+        last_seen_ns=max(new.last_seen_ns, old.last_seen_ns),
+        views=new.views + old.views,
+        confidence=min(new.confidence, old.confidence) * alike,
+    )
