@@ -128,3 +128,19 @@ def test_a_track_becomes_the_belief():
     belief = recorded_belief(told, t_ns)
     assert off(belief.xyyaw, track.xyyaw).max() < 0.1
     assert (np.diff(np.flatnonzero(belief.has_pose)) == 1).all()
+
+
+def test_a_wall_at_the_edge_of_the_unknown_leaves_known_room_behind():
+    bundle = synthetic_bundle(seconds=3.0)
+    grid = bundle.view().grid
+    cells = grid.cells.copy()
+    cells[:2] = -1  # the room's lower wall is two cells thick; now only one is known
+    cells[1] = 100
+    dark = type(grid)(cells, grid.resolution_m, grid.origin_xyyaw)
+    view = bundle.view().with_grid(dark)
+    box = _box(grid, (0, 3), (60, 80))
+
+    edited = inject.appeared(view, box).view.grid
+
+    assert (edited.cells[:2, 62:78] == 0).all()
+    assert (edited.cells[0, 100:] == -1).all()

@@ -26,6 +26,7 @@ from slamreplay.geometry.times import NO_STAMP, NS_PER_S
 from slamreplay.maps.grid import FREE, OCCUPIED, OccupancyGrid
 
 Box = tuple[float, float, float, float]
+_CLEARED_M = 0.5
 Kind = Literal["none", "kidnap", "wrong_start", "appeared", "removed", "moved"]
 
 
@@ -124,13 +125,14 @@ def wrong_start(view: BundleView, from_ns: int, offset_xyyaw: ArrayLike) -> Inje
 def appeared(view: BundleView, box_m: Box) -> Injection:
     """The walls in a box are taken off the map: to the map, what stands there is new.
 
+    Unknown cells within half a metre of them become free too: a wall at the edge of the unknown
+    would contradict no map that merely ends there.
+
     Raises:
         UsageError: the box holds no mapped wall.
     """
     grid, rows, cols = _walls(view, box_m)
-    cells = grid.cells.copy()
-    cells[rows, cols] = FREE
-    edited = _with_cells(view, grid, cells)
+    edited = _with_cells(view, grid, _cleared(grid, rows, cols))
     return Injection("appeared", edited, view.manifest.start_ns, _around(grid, rows, cols))
 
 
@@ -168,8 +170,7 @@ def moved(view: BundleView, box_m: Box, shift_xy_m: ArrayLike) -> Injection:
     target = target[grid.inside(target)]
     if not len(target):
         raise UsageError("the shift takes the walls off the map")
-    cells = grid.cells.copy()
-    cells[rows, cols] = FREE
+    cells = _cleared(grid, rows, cols)
     cells[target[:, 0], target[:, 1]] = OCCUPIED
     edited = _with_cells(view, grid, cells)
     return Injection(
@@ -354,6 +355,21 @@ def _walls(
     if not len(rows):
         raise UsageError(f"the box {box_m} holds no mapped wall")
     return grid, rows, cols
+
+
+def _cleared(
+    grid: OccupancyGrid, rows: NDArray[np.int64], cols: NDArray[np.int64]
+) -> NDArray[np.int8]:
+    """Cells without these walls, known to be free about where they were."""
+    from scipy.ndimage import distance_transform_edt
+
+    cells = grid.cells.copy()
+    walls = np.ones(cells.shape, dtype=bool)
+    walls[rows, cols] = False
+    near = distance_transform_edt(walls) * grid.resolution_m <= _CLEARED_M
+    cells[near & (cells < 0)] = FREE
+    cells[rows, cols] = FREE
+    return cells
 
 
 def _with_cells(view: BundleView, grid: OccupancyGrid, cells: NDArray[np.int8]) -> BundleView:

@@ -18,7 +18,7 @@ from slamreplay.bundle.view import BundleView
 from slamreplay.errors import UsageError
 from slamreplay.geometry import se2
 from slamreplay.geometry.times import NS_PER_S, ns
-from slamreplay.maps.grid import OCCUPIED, OccupancyGrid
+from slamreplay.maps.grid import FREE, OCCUPIED, OccupancyGrid
 from slamreplay.maps.raycast import cast_rays
 
 Flags = NDArray[np.bool_]
@@ -166,7 +166,7 @@ def edited_beams(injection: Injection, log: Recorded) -> se2.Array:
 
     Cast from the true poses into the edited map: a beam that ends nearer than the map says, away
     from every drawn wall and in the box where the walls were taken off, or one that goes on through
-    the walls that were drawn.
+    the walls that were drawn. What lies behind unknown cells is unchanged.
     """
     from scipy.ndimage import distance_transform_edt
 
@@ -175,6 +175,8 @@ def edited_beams(injection: Injection, log: Recorded) -> se2.Array:
         raise UsageError("the log has no map to edit")
     scans = log.scans
     away = distance_transform_edt(~grid.occupied) * grid.resolution_m
+    opaque = np.where(grid.occupied | (grid.cells < 0), OCCUPIED, FREE).astype(np.int8)
+    told = OccupancyGrid(opaque, grid.resolution_m, grid.origin_xyyaw)
     poses = se2.compose(log.xyyaw, scans.xyyaw_base_laser)
     shares = np.zeros(len(poses))
     taken = injection.box_m if injection.kind in ("appeared", "moved") else None
@@ -186,17 +188,20 @@ def edited_beams(injection: Injection, log: Recorded) -> se2.Array:
         bearings = scans.bearings(int(k))[valid]
         measured = np.where(scans.hits[k], scans.ranges_m[k], scans.range_max_m[k])[valid]
         measured = measured.astype(np.float64)
-        said = cast_rays(grid, poses[k : k + 1], bearings, float(scans.range_max_m[k]))[0]
+        said = cast_rays(told, poses[k : k + 1], bearings, float(scans.range_max_m[k]))[0]
         changed = np.zeros(len(bearings), dtype=bool)
-        hit = scans.hits[k][valid]
         if taken is not None:
             ends = _ends(poses[k], bearings, measured)
             cell = np.clip(grid.cell_of(ends), 0, np.array(grid.cells.shape) - 1)
             far = away[cell[:, 0], cell[:, 1]] > FAR_M
-            changed |= hit & far & (said - measured > FAR_M) & in_box(ends, taken)
+            nearer = scans.hits[k][valid] & (said - measured > FAR_M)
+            changed |= nearer & far & in_box(ends, taken)
         if drawn is not None:
-            walls = _ends(poses[k], bearings, np.where(np.isfinite(said), said, 0.0))
-            changed |= (measured - said > FAR_M) & in_box(walls, drawn)
+            reach = np.where(np.isfinite(said), said, 0.0) + 0.5 * grid.resolution_m
+            walls = _ends(poses[k], bearings, reach)
+            cell = np.clip(grid.cell_of(walls), 0, np.array(grid.cells.shape) - 1)
+            wall = grid.occupied[cell[:, 0], cell[:, 1]]
+            changed |= (measured - said > FAR_M) & wall & in_box(walls, drawn)
         shares[k] = changed.mean()
     return shares
 
