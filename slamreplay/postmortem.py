@@ -20,10 +20,8 @@ from slamreplay.hindsight.pipeline import hindsight
 from slamreplay.replay.metrics import trial_metrics
 from slamreplay.report.evidence import Postmortem, TrialResult
 from slamreplay.report.metrics import run_metrics
-from slamreplay.verdict.belief_error import belief_error
 from slamreplay.verdict.judge import judge
 from slamreplay.verdict.limits import Limits
-from slamreplay.verdict.map_frame import constant_offset
 
 __all__ = ["Postmortem", "belief_times", "postmortem"]
 
@@ -64,9 +62,6 @@ def postmortem(
     for name in CHECKS:
         findings += CHECKS.load(name)(context)
     track = None if found is None else found.track
-    offset = None
-    if found is not None and belief is not None:
-        offset = constant_offset(view, belief_error(belief, found, limits), limits)
     trials = tuple(
         TrialResult(
             run,
@@ -89,7 +84,7 @@ def postmortem(
         findings=_worst_first(findings),
         limits=limits,
         odometry=odometry_track(view),
-        frame_offset=offset if offset is not None and offset.cause == "map" else None,
+        frame_offset=judgement.frame_offset,
         nees=nees_of_belief(context),
         trials=trials,
     )

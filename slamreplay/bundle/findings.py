@@ -132,18 +132,65 @@ FINDINGS: dict[str, Explanation] = {
         "Median offset of log time minus header stamp, and its drift over the log.",
         "Simulated time is meant to differ; replayed bags carry the old stamps.",
     ),
+    "SR-CLK-002": Explanation(
+        "Scans and odometry do not share a clock",
+        "Do scans, laid on the map, turn when odometry says so?",
+        "In every turn the lag of the scans' heading behind odometry's is regressed on the turn "
+        "rate, beside a constant, a drift and a scale error; robust mean over the turns. The IMU, "
+        "or the odometry topic where tf was compared, says which of the two is late.",
+        "Fewer than two turns tell nothing. Steady turning alone tells a delay from a scale error "
+        "badly; the sigma says so. Deskewing by a wrong time_increment adds half a sweep.",
+    ),
+    "SR-ODO-001": Explanation(
+        "Odometry and the robot moved otherwise",
+        "Did the wheels count a motion that the robot did not make, or miss one that it made?",
+        "Motions over one second, odometry against hindsight, calibration errors taken out; 0.15 m "
+        "or 6 deg in a second and 0.25 m or 8 deg in all. Way counted against way made names it: "
+        "translational, sideways or rotational slip, or a robot that was carried.",
+        "Where hindsight jumps to another place in error this looks the same: see its coverage.",
+    ),
+    "SR-ODO-002": Explanation(
+        "Odometry is not calibrated",
+        "Does odometry count too much or too little all along?",
+        "Medians over all seconds of motion of way and turn counted over way and turn made "
+        "(hindsight), and of the turn it invents per metre of straight way.",
+        "A floor that slips everywhere is no different from a wrong wheel diameter.",
+    ),
     "SR-ACT-001": Explanation(
         "An action the uncertainty did not allow",
         "Did 3 standard deviations of the position fit between the robot and the nearest obstacle?",
-        "Published covariance projected onto the direction of the nearest obstacle (local costmap, "
-        "else map) against the clearance from the footprint's edge.",
+        "Published covariance projected onto the direction of the nearest obstacle along the "
+        "action's path (first 1.5 m of its plan, else what it drove in 3 s; local costmap, else "
+        "map) against the clearance from the footprint's edge.",
         "An over-confident covariance lets everything pass; the costmap's obstacles may be people.",
     ),
     "SR-ACT-002": Explanation(
         "An unplanned stop",
         "Did the robot stop before it had arrived?",
-        "Odometry comes to rest, and a recovery follows, commands go on, or the plan's end is far.",
+        "Odometry comes to rest, and a recovery follows, a safety device speaks up, the goal is "
+        "aborted or still active, commands go on, or the plan's end is far.",
         "A goal that was cancelled on purpose looks the same: goals are not in the log's topics.",
+    ),
+    "SR-ACT-003": Explanation(
+        "An incomplete or stale belief was acted on",
+        "Did the belief that a motion or recovery was built on come with frame, time, covariance "
+        "and map version, and was it fresh?",
+        "For each action the localizer's last word that had arrived: its age against the limit "
+        "(one that speaks on motion only is stale if the robot moved meanwhile), its covariance, "
+        "and the map version on record.",
+        "A log without the map topic or the pose topic lacks what the robot itself may have had.",
+    ),
+    "SR-ACT-004": Explanation(
+        "The gate was passed on a false covariance",
+        "Was an action allowed although the belief was really farther off than there was room?",
+        "Belief against hindsight when the action began, against the clearance along its path.",
+        "The clearance is taken where the robot believed to be; where it really was it may differ.",
+    ),
+    "SR-ACT-005": Explanation(
+        "A needless recovery",
+        "Did the robot recover although it was right about where it was and the map was right?",
+        "Recoveries begun in a healthy interval with the belief within half of the lost limit.",
+        "Somebody may have stood in the way: people are no change of the map.",
     ),
     "SR-DAT-001": Explanation(
         "Parts of the replay bundle are missing",

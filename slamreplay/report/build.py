@@ -11,6 +11,7 @@ from slamreplay.report.evidence import Postmortem, TrialResult
 from slamreplay.report.model import (
     SCHEMA_VERSION,
     ActionPart,
+    BeliefPart,
     BundlePart,
     FailureModePart,
     FindingPart,
@@ -22,6 +23,7 @@ from slamreplay.report.model import (
     TrialPart,
     VerdictPart,
 )
+from slamreplay.verdict.judgement import Consumed
 
 TRAJECTORY_FILE = "hindsight.tum"
 
@@ -44,7 +46,10 @@ def build(post: Postmortem) -> Report:
             missing=manifest.missing_parts(),
         ),
         verdict=VerdictPart(
-            state=judgement.state, confidence=judgement.confidence, summary=judgement.summary
+            state=judgement.state,
+            confidence=judgement.confidence,
+            summary=judgement.summary,
+            lacking=list(judgement.lacking),
         ),
         intervals=[
             IntervalPart(**_picked(i, IntervalPart, findings=list(i.findings)))
@@ -59,7 +64,10 @@ def build(post: Postmortem) -> Report:
             kind=mode.kind, confidence=mode.confidence, evidence=list(mode.evidence)
         ),
         stops=[StopPart(**_picked(s, StopPart)) for s in judgement.stops],
-        actions=[ActionPart(**_picked(a, ActionPart)) for a in judgement.actions],
+        actions=[
+            ActionPart(**_picked(a, ActionPart, belief=_belief(a.belief)))
+            for a in judgement.actions
+        ],
         findings=[_finding(f) for f in post.findings],
         trials=[_trial(t) for t in post.trials],
     )
@@ -68,6 +76,12 @@ def build(post: Postmortem) -> Report:
 def _picked(source: object, part: type, **instead: Any) -> dict[str, Any]:
     names = part.model_fields  # type: ignore[attr-defined]
     return {name: instead[name] if name in instead else getattr(source, name) for name in names}
+
+
+def _belief(consumed: Consumed | None) -> BeliefPart | None:
+    if consumed is None:
+        return None
+    return BeliefPart(**_picked(consumed, BeliefPart, lacks=list(consumed.lacks)))
 
 
 def _bbox(box: Any) -> tuple[float, ...]:

@@ -18,9 +18,8 @@ from slamreplay.consistency.nees import Nees
 from slamreplay.geometry import se2
 from slamreplay.geometry.times import seconds_since
 from slamreplay.maps.grid import OccupancyGrid
-from slamreplay.verdict.judgement import Judgement
+from slamreplay.verdict.judgement import ConstantOffset, Judgement
 from slamreplay.verdict.limits import Limits
-from slamreplay.verdict.map_frame import ConstantOffset
 
 
 @dataclass(frozen=True, eq=False)

@@ -58,11 +58,12 @@ class BundlePart(_Strict):
 
 
 class VerdictPart(_Strict):
-    """The answer, and one sentence a shift lead understands."""
+    """The answer, one sentence a shift lead understands, and evidence it had to do without."""
 
     state: State
     confidence: Share
     summary: Text
+    lacking: list[Text]
 
 
 class IntervalPart(_Strict):
@@ -120,11 +121,27 @@ class StopPart(_Strict):
     cause: Text
 
 
+class BeliefPart(_Strict):
+    """The belief an action consumed: null where the log does not tell, `lacks` in words.
+
+    `t_ns` is when the localizer's last word before the action was said, `sigma_xyyaw` in m, m, rad.
+    """
+
+    frame_id: str | None
+    t_ns: Count
+    age_s: Number
+    sigma_xyyaw: tuple[float, float, float] | None
+    map_version: str | None
+    consumer: Text
+    lacks: list[Text]
+
+
 class ActionPart(_Strict):
     """A recovery or motion, and whether the uncertainty of that moment allowed it.
 
-    `sigma_m` is towards the nearest obstacle, `clearance_m` from the footprint's edge, `ratio` is
-    3 sigma over clearance; `allowed` is null where these are not known.
+    `sigma_m` is towards the nearest obstacle along its path, `clearance_m` from the footprint's
+    edge, `ratio` is 3 sigma over clearance; `allowed` is null where these are not known. `error_m`
+    is how far off the belief really was; `needless` of a recovery of a robot that was right.
     """
 
     t_ns: Ns
@@ -134,6 +151,9 @@ class ActionPart(_Strict):
     clearance_m: Number
     ratio: Number
     allowed: bool | None
+    error_m: Number
+    needless: bool | None
+    belief: BeliefPart | None
 
 
 class FindingPart(_Strict):

@@ -56,6 +56,7 @@ class Page:
     facts: tuple[Fact, ...]
     failure_mode: str
     evidence: tuple[str, ...]
+    lacking: tuple[str, ...]
     bands: tuple[Band, ...]
     marks: tuple[Band, ...]
     end: str
@@ -97,6 +98,7 @@ def page(post: Postmortem) -> Page:
         facts=deciding_facts(post),
         failure_mode=_failure_mode(post),
         evidence=judgement.failure_mode.evidence,
+        lacking=judgement.lacking,
         bands=_bands(post),
         marks=_marks(post),
         end=seconds(manifest.end_ns - manifest.start_ns),

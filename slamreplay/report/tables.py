@@ -10,6 +10,7 @@ import numpy as np
 from slamreplay.report.evidence import Postmortem
 from slamreplay.report.phrases import NOT_KNOWN, number, percent, seconds, short, span
 from slamreplay.report.words import STATES
+from slamreplay.verdict.judgement import Consumed
 
 #: Rows of one table on the page; report.json has them all.
 MOST_ROWS = 40
@@ -105,13 +106,24 @@ def actions(post: Postmortem) -> Table:
             number(a.sigma_m, ".3f", "m"),
             number(a.clearance_m, ".2f", "m"),
             number(a.ratio),
-            words[a.allowed],
+            Cell(words[a.allowed], "needless" if a.needless else ""),
+            number(a.error_m, ".2f", "m"),
+            _consumed(a.belief),
         )
         for a in actions
     ]
-    return table(
-        ("when", "kind", "name", "sigma", "clearance", "3 sigma / clearance", "allowed"), rows
-    )
+    head = ("when", "kind", "name", "sigma", "clearance", "3 sigma / clearance", "allowed")
+    return table((*head, "really off by", "belief it consumed"), rows)
+
+
+def _consumed(belief: Consumed | None) -> Cell:
+    """Frame and age, with what of the contract it lacks under it."""
+    if belief is None or belief.frame_id is None:
+        return Cell("none", "" if belief is None else belief.consumer)
+    age = "" if belief.age_s is None else f", {belief.age_s:.2f} s old"
+    version = "" if belief.map_version is None else f", map {belief.map_version[-8:]}"
+    lacks = f"; {', '.join(belief.lacks)}" if belief.lacks else ""
+    return Cell(f"{belief.frame_id}{age}{version}", f"by {belief.consumer}{lacks}")
 
 
 def regions(post: Postmortem) -> Table:

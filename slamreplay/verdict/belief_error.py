@@ -51,8 +51,17 @@ class BeliefError:
             )
 
 
-def belief_error(belief: PoseTrack | None, hindsight: Hindsight, limits: Limits) -> BeliefError:
-    """The belief at hindsight's scans; of no belief at all, every row is unspoken."""
+def belief_error(
+    belief: PoseTrack | None, hindsight: Hindsight, limits: Limits, late_ns: int = 0
+) -> BeliefError:
+    """The belief at hindsight's scans; of no belief at all, every row is unspoken.
+
+    Args:
+        belief: base in map as believed.
+        hindsight: base in map as it was.
+        limits: what can be judged.
+        late_ns: by how much later than measured the scans are stamped.
+    """
     track = hindsight.track
     order = np.argsort(track.t_ns, kind="stable")
     track = track.take(order)
@@ -62,7 +71,10 @@ def belief_error(belief: PoseTrack | None, hindsight: Hindsight, limits: Limits)
             track.frame_id, track.child_frame_id, track.t_ns, empty
         )
     spoken = _from_first(belief, track.t_ns)
-    there = belief.at(track.t_ns)
+    there = belief.at(track.t_ns - late_ns)
+    if late_ns:  # within the delay after its first word the belief of that moment held
+        first = ~there.has_pose & spoken
+        there = _first_of(there, belief.at(track.t_ns), first)
     step = there.xyyaw - track.xyyaw
     distance = np.hypot(step[:, 0], step[:, 1])
     sigma_m, sigma_rad = _sigma(step, track.cov)
@@ -77,6 +89,12 @@ def belief_error(belief: PoseTrack | None, hindsight: Hindsight, limits: Limits)
         judgeable(hindsight, limits)[order],
         spoken,
     )
+
+
+def _first_of(there: PoseTrack, now: PoseTrack, rows: NDArray[np.bool_]) -> PoseTrack:
+    xyyaw, cov = there.xyyaw.copy(), there.cov.copy()
+    xyyaw[rows], cov[rows] = now.xyyaw[rows], now.cov[rows]
+    return PoseTrack(there.frame_id, there.child_frame_id, there.t_ns, xyyaw, cov)
 
 
 def judgeable(hindsight: Hindsight, limits: Limits) -> NDArray[np.bool_]:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from slamreplay.bundle.odometry import odometry_track
 from slamreplay.bundle.tables import Table
@@ -19,6 +20,9 @@ from slamreplay.maps.grid import OccupancyGrid
 FRESH_NS = 5_000_000_000
 #: nav2 publishes lethal cells as 100 and those within the inscribed radius of one as 99.
 LETHAL, INSCRIBED = 100, 99
+#: The path of a robot that stays where it is.
+HERE: se2.Array = np.zeros((1, 2))
+HERE.flags.writeable = False
 
 
 @dataclass(frozen=True)
@@ -49,17 +53,27 @@ class Obstacles:
         )
         told = None if self._costmaps is None else inscribed_radius_m(self._costmaps)
         self.radius_m = footprint_radius_m if told is None else told
+        self._tree: cKDTree | None = None
         self._walls = None if view.grid is None else _centres(view.grid, view.grid.occupied)
 
-    def clearance(self, t_ns: int) -> Clearance | None:
-        """At a time on the bundle's clock; None where neither costmap nor map can tell."""
-        found = self._from_costmap(t_ns)
+    def clearance(self, t_ns: int, path_xy: se2.Array = HERE) -> Clearance | None:
+        """At a time on the bundle's clock; None where neither costmap nor map can tell.
+
+        Args:
+            t_ns: the time.
+            path_xy: (M, 2) places the robot is about to pass, in its base frame at that time.
+        """
+        found = self._from_costmap(t_ns, path_xy)
         if found is not None or self._walls is None or not len(self._walls):
             return found
         pose = _latest(self._belief, t_ns)
-        return None if pose is None else self._nearest(self._walls, pose, 0.0)
+        if pose is None:
+            return None
+        if self._tree is None:
+            self._tree = cKDTree(self._walls)
+        return self._nearest(self._tree, pose, path_xy, 0.0)
 
-    def _from_costmap(self, t_ns: int) -> Clearance | None:
+    def _from_costmap(self, t_ns: int, path_xy: se2.Array) -> Clearance | None:
         if self._costmaps is None:
             return None
         row = int(np.searchsorted(self._costmaps.t_ns, t_ns, side="right")) - 1
@@ -75,14 +89,20 @@ class Obstacles:
             pose = _latest(self._odometry, t_ns)
             if pose is not None and believed is not None:
                 turn = float(believed[2] - pose[2])  # costmap axes to the map's
-        return None if pose is None or not len(points) else self._nearest(points, pose, turn)
+        if pose is None or not len(points):
+            return None
+        return self._nearest(cKDTree(points), pose, path_xy, turn)
 
-    def _nearest(self, points: se2.Array, pose: se2.Array, turn: float) -> Clearance:
-        step = points - pose[:2]
-        distance = np.hypot(step[:, 0], step[:, 1])
+    def _nearest(
+        self, tree: cKDTree, pose: se2.Array, path_xy: se2.Array, turn: float
+    ) -> Clearance:
+        """The narrowest place of the path, and the direction of what is nearest there."""
+        places = se2.transform_points(pose, path_xy)
+        distance, nearest = tree.query(places)
         i = int(np.argmin(distance))
+        step = np.asarray(tree.data)[nearest[i]] - places[i]
         cos, sin = np.cos(turn), np.sin(turn)
-        direction = (cos * step[i, 0] - sin * step[i, 1], sin * step[i, 0] + cos * step[i, 1])
+        direction = (cos * step[0] - sin * step[1], sin * step[0] + cos * step[1])
         return Clearance(
             float(distance[i]) - self.radius_m, (float(direction[0]), float(direction[1]))
         )

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import replace
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -12,10 +11,15 @@ from slamreplay.bundle.products import Hindsight
 from slamreplay.bundle.track import PoseTrack
 from slamreplay.bundle.view import BundleView
 from slamreplay.geometry.times import NS_PER_S
-from slamreplay.verdict.judgement import Interval
+from slamreplay.verdict.intervals import episodes
+from slamreplay.verdict.judgement import ConstantOffset, Interval
 from slamreplay.verdict.limits import Limits
 from slamreplay.verdict.map_fit import MapFit
-from slamreplay.verdict.map_frame import ConstantOffset
+from slamreplay.verdict.timing import Delay
+from slamreplay.verdict.wheels import LEAST_M, Wheels
+
+#: A delay of this size makes a robot misplace walls by a cell and more.
+LATE_S = 0.1
 
 
 def verdict_findings(
@@ -36,35 +40,14 @@ def verdict_findings(
     if view.grid is None:
         text = "no map in the log and none given: nothing can be judged against it"
         found.append(Finding("SR-MAP-002", "warning", text, *span))
-    found += [_lost(e, view, limits) for e in _episodes(intervals, lambda i: i.is_lost)]
-    found += [_changed(e, hindsight, limits) for e in _episodes(intervals, lambda i: i.is_changed)]
+    found += [_lost(e, view, limits) for e in episodes(intervals, lambda i: i.is_lost)]
+    found += [_changed(e, hindsight, limits) for e in episodes(intervals, lambda i: i.is_changed)]
     if hindsight is not None:
         found += _unobservable(intervals, hindsight, limits)
     found += _wrong_map(fit, limits, span)
     found += _offset(offset, span)
     found += _unjudged(intervals, span)
     return tuple(sorted(found, key=lambda f: (-SEVERITIES.index(f.severity), f.start_ns or 0)))
-
-
-def _episodes(intervals: Sequence[Interval], wanted: Callable[[Interval], bool]) -> list[Interval]:
-    """Neighbouring intervals that answer one question with yes, made one."""
-    found: list[Interval] = []
-    for i in intervals:
-        if not wanted(i):
-            continue
-        last = found[-1] if found else None
-        if last is None or last.end_ns != i.start_ns:
-            found.append(i)
-            continue
-        metres = [v for v in (last.max_error_m, i.max_error_m) if v is not None]
-        radians = [v for v in (last.max_error_rad, i.max_error_rad) if v is not None]
-        found[-1] = replace(
-            last,
-            end_ns=i.end_ns,
-            max_error_m=max(metres, default=None),
-            max_error_rad=max(radians, default=None),
-        )
-    return found
 
 
 def _lost(i: Interval, view: BundleView, limits: Limits) -> Finding:
@@ -162,6 +145,34 @@ def _offset(offset: ConstantOffset | None, span: tuple[int, int]) -> list[Findin
             unit="m",
         )
     ]  # fmt: skip
+
+
+def motion_findings(
+    view: BundleView, delay: Delay | None, turned: Wheels | None
+) -> tuple[Finding, ...]:
+    """SR-CLK-002 and SR-ODO-001: what the clocks and the wheels did to the log."""
+    span = (view.manifest.start_ns, view.manifest.end_ns)
+    found: list[Finding] = []
+    if delay is not None and delay.is_significant:
+        low, high = (delay.seconds + k * 2.0 * delay.sigma_s for k in (-1, 1))
+        severity: Severity = "warning" if abs(delay.seconds) >= LATE_S else "info"
+        found.append(
+            Finding(
+                "SR-CLK-002", severity, delay.text, *span, value=delay.seconds, low=low, high=high,
+                unit="s", n=delay.turns,
+            )
+        )  # fmt: skip
+    if turned is not None:
+        for slip in turned.slips:
+            text = slip.text(span[0])
+            found.append(
+                Finding(
+                    "SR-ODO-001", "warning", text, slip.start_ns, slip.end_ns, value=slip.metres,
+                    low=0.0, high=LEAST_M, unit="m",
+                )
+            )  # fmt: skip
+        found += [Finding("SR-ODO-002", "info", text, *span) for text in turned.calibration_words]
+    return tuple(found)
 
 
 def _unjudged(intervals: Sequence[Interval], span: tuple[int, int]) -> list[Finding]:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from itertools import pairwise
 
 from slamreplay.verdict.judgement import Interval, State
@@ -53,6 +54,27 @@ def log_state(intervals: Sequence[Interval], limits: Limits) -> State:
         return "unobservable"
     # A log of no length at all cannot be judged either.
     return "insufficient_data" if 2 * (unjudged + unobservable) > whole or not whole else "healthy"
+
+
+def episodes(intervals: Sequence[Interval], wanted: Callable[[Interval], bool]) -> list[Interval]:
+    """Neighbouring intervals that answer one question with yes, made one."""
+    found: list[Interval] = []
+    for i in intervals:
+        if not wanted(i):
+            continue
+        last = found[-1] if found else None
+        if last is None or last.end_ns != i.start_ns:
+            found.append(i)
+            continue
+        metres = [v for v in (last.max_error_m, i.max_error_m) if v is not None]
+        radians = [v for v in (last.max_error_rad, i.max_error_rad) if v is not None]
+        found[-1] = replace(
+            last,
+            end_ns=i.end_ns,
+            max_error_m=max(metres, default=None),
+            max_error_rad=max(radians, default=None),
+        )
+    return found
 
 
 def _value(timeline: Timeline, t_ns: int) -> int:

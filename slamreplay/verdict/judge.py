@@ -10,16 +10,20 @@ from slamreplay.bundle.findings import Finding
 from slamreplay.bundle.products import Hindsight
 from slamreplay.bundle.track import PoseTrack
 from slamreplay.bundle.view import BundleView
-from slamreplay.verdict.actions import actions, risky
-from slamreplay.verdict.failure_mode import failure_mode
-from slamreplay.verdict.findings import verdict_findings
+from slamreplay.verdict.actions import Outcome, actions, risky
+from slamreplay.verdict.contract import contract_findings
+from slamreplay.verdict.failure_mode import Case, failure_mode
+from slamreplay.verdict.findings import motion_findings, verdict_findings
 from slamreplay.verdict.intervals import log_state
 from slamreplay.verdict.judgement import FailureMode, Interval, Judgement, State
+from slamreplay.verdict.lacking import lacking
 from slamreplay.verdict.limits import Limits
 from slamreplay.verdict.map_fit import MapFit, map_fit
 from slamreplay.verdict.stops import stop_findings, stops
 from slamreplay.verdict.summary import summary
 from slamreplay.verdict.tiles import Evidence, gathered, intervals_of
+from slamreplay.verdict.timing import Delay, scan_delay
+from slamreplay.verdict.wheels import Wheels, wheels
 
 _DEFAULT = Limits()
 
@@ -51,12 +55,14 @@ def judge(
         return _unjudged(view, belief, hindsight, limits, fit=fit)
     if hindsight.margin is not None and hindsight.margin < limits.margin:
         return _unjudged(view, belief, hindsight, limits, ambiguous=True)
-    evidence = gathered(view, belief, hindsight, limits)
+    delay = scan_delay(view, hindsight)
+    evidence = gathered(view, belief, hindsight, limits, delay)
     intervals = intervals_of(view, evidence, limits)
     state = log_state(intervals, limits)
-    mode = _mode(view, belief, hindsight, evidence, intervals, limits)
-    found_stops = stops(view, belief, hindsight.track, intervals)
-    done = actions(view, belief, limits)
+    turned = wheels(view, evidence.error)
+    mode = _mode(view, belief, hindsight, evidence, intervals, limits, delay, turned)
+    found_stops = stops(view, belief, hindsight.track, intervals, mode)
+    done = actions(view, belief, limits, Outcome(evidence.error, intervals))
     reason = "hindsight does not know where it was for most of the log"
     text = summary(
         state,
@@ -71,11 +77,25 @@ def judge(
     )
     findings = (
         *verdict_findings(view, belief, hindsight, intervals, evidence.offset, limits),
+        *motion_findings(view, delay, turned),
         *risky(done),
+        *contract_findings(done),
         *stop_findings(found_stops, view.manifest.start_ns),
     )
     sure = _log_confidence(state, intervals)
-    return Judgement(state, sure, text, intervals, mode, found_stops, done, findings)
+    offset = evidence.offset
+    return Judgement(
+        state,
+        sure,
+        text,
+        intervals,
+        mode,
+        found_stops,
+        done,
+        findings,
+        offset if offset is not None and offset.cause == "map" else None,
+        lacking(view, belief, hindsight, delay),
+    )
 
 
 def _mode(
@@ -85,6 +105,8 @@ def _mode(
     evidence: Evidence,
     intervals: tuple[Interval, ...],
     limits: Limits,
+    delay: Delay | None,
+    turned: Wheels | None,
 ) -> FailureMode:
     offset = evidence.offset
     if offset is not None and offset.cause == "map":
@@ -102,7 +124,7 @@ def _mode(
         u = u / np.maximum(np.hypot(u[:, 0], u[:, 1]), 1e-9)[:, None]
         with np.errstate(invalid="ignore"):
             sigma = np.sqrt(np.einsum("ni,nij,nj->n", u, cov, u))
-    mode = failure_mode(view, error, hindsight, intervals, sigma, limits)
+    mode = failure_mode(Case(view, error, hindsight, intervals, sigma, limits, delay, turned))
     if offset is not None and offset.cause == "map_or_start" and mode.kind != "none":
         text = f"a map frame shifted by {offset.text} would explain it equally well"
         mode = replace(mode, confidence=0.5, evidence=(*mode.evidence, text))
@@ -170,6 +192,8 @@ def _unjudged(
     findings: tuple[Finding, ...] = (
         *verdict_findings(view, belief, hindsight, whole, None, limits, fit),
         *risky(done),
+        *contract_findings(done),
         *stop_findings(found_stops, start),
     )
-    return Judgement(state, None, text, whole, mode, found_stops, done, findings)
+    left = lacking(view, belief, hindsight, None)
+    return Judgement(state, None, text, whole, mode, found_stops, done, findings, lacking=left)

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+import numpy as np
+
 from slamreplay.bundle.findings import Finding
 
 State = Literal[
@@ -39,8 +41,8 @@ class Interval:
     """A stretch [start_ns, end_ns) of one state.
 
     Attributes:
-        confidence: that the state is the right one, None where nothing was decided. Not calibrated
-            yet: see `confidence`.
+        confidence: that the state is the right one, None where nothing was decided; see
+            `confidence` for how it was calibrated.
         max_error_m: largest distance between belief and hindsight in it, None where unknown.
         max_error_rad: largest difference in heading, rad.
         findings: ids of the findings that made the state.
@@ -98,14 +100,41 @@ class Stop:
 
 
 @dataclass(frozen=True)
+class Consumed:
+    """The belief that an action was built on: the contract, as far as the log tells it.
+
+    Attributes:
+        frame_id: frame of the pose, None where there was no belief.
+        t_ns: when the localizer's last word before the action was said; None without one.
+        age_s: how old it was when the action began.
+        sigma_xyyaw: its standard deviations in m, m, rad; None without a covariance.
+        map_version: version of the map that held then; None where the log does not tell.
+        consumer: who acted on it: topic or behaviour.
+        lacks: what of the contract is missing or stale, in words.
+    """
+
+    frame_id: str | None
+    t_ns: int | None
+    age_s: float | None
+    sigma_xyyaw: tuple[float, float, float] | None
+    map_version: str | None
+    consumer: str
+    lacks: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
 class Action:
     """A recovery or a motion, and whether the uncertainty of that moment allowed it.
 
     Attributes:
-        sigma_m: standard deviation of the position towards the nearest obstacle.
+        sigma_m: standard deviation of the position towards the nearest obstacle along its path.
         clearance_m: from the footprint's edge to that obstacle.
         ratio: 3 sigma over clearance; None where either is unknown or there is no clearance left.
         allowed: whether 3 sigma fit into the clearance; None where that is unknown.
+        error_m: how far the belief really was from hindsight then, None where unknown.
+        needless: of a recovery, whether the robot was right about where it was in a map that was
+            right; None where unknown and of motions.
+        belief: what it was built on, None where it was not looked up.
     """
 
     t_ns: int
@@ -115,6 +144,37 @@ class Action:
     clearance_m: float | None
     ratio: float | None
     allowed: bool | None
+    error_m: float | None = None
+    needless: bool | None = None
+    belief: Consumed | None = None
+
+
+Cause = Literal["map", "map_or_start", "lookalike"]
+
+
+@dataclass(frozen=True)
+class ConstantOffset:
+    """Belief = offset after hindsight, all along.
+
+    Attributes:
+        xyyaw: (3,) the transform, in the map frame: m, m, rad.
+        at_robot_m: median distance it makes where the robot was.
+        at_robot_rad: its turn.
+        spread_m: nine of ten rows stay within this of it.
+        cause: map, map_or_start (both explain it equally) or lookalike (the robot was lost).
+    """
+
+    xyyaw: tuple[float, float, float]
+    at_robot_m: float
+    at_robot_rad: float
+    spread_m: float
+    cause: Cause
+
+    @property
+    def text(self) -> str:
+        """The offset in words."""
+        turn = np.degrees(self.xyyaw[2])
+        return f"x {self.xyyaw[0]:+.2f} m, y {self.xyyaw[1]:+.2f} m, {turn:+.1f} deg"
 
 
 @dataclass(frozen=True)
@@ -130,6 +190,9 @@ class Judgement:
         stops: every unplanned stop, in time order.
         actions: recoveries and motions, in time order.
         findings: what made the verdict, worst first.
+        frame_offset: what was taken out of the belief because the map lies elsewhere than the
+            robot's own; None where nothing was.
+        lacking: evidence the verdict had to do without, each with what it leaves open.
     """
 
     state: State
@@ -140,3 +203,5 @@ class Judgement:
     stops: tuple[Stop, ...]
     actions: tuple[Action, ...]
     findings: tuple[Finding, ...]
+    frame_offset: ConstantOffset | None = None
+    lacking: tuple[str, ...] = ()

@@ -32,6 +32,7 @@ class Limits:
             a shifted map.
         frame_offset_rad: the same for a turned one.
         gate_sigmas: standard deviations that must fit into the clearance.
+        stale_s: a belief older than this is stale when it is acted on.
         footprint_radius_m: used where the log's costmap does not tell the robot's inscribed radius.
     """
 
@@ -51,4 +52,5 @@ class Limits:
     frame_offset_m: float = 0.2
     frame_offset_rad: float = math.radians(3.0)
     gate_sigmas: float = 3.0
+    stale_s: float = 1.0
     footprint_radius_m: float = 0.25

@@ -8,16 +8,14 @@ as in the right place, it sat in a look-alike place and was lost.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Literal
-
 import numpy as np
 
 from slamreplay.bundle.odometry import odometry_track
-from slamreplay.bundle.scans import scan_set
 from slamreplay.bundle.view import BundleView
 from slamreplay.geometry import se2
 from slamreplay.verdict.belief_error import BeliefError
+from slamreplay.verdict.fit_at import fits_at_belief
+from slamreplay.verdict.judgement import Cause, ConstantOffset
 from slamreplay.verdict.limits import Limits
 
 #: The offset is constant where nine of ten rows stay this close to it, and it covers this share of
@@ -25,36 +23,6 @@ from slamreplay.verdict.limits import Limits
 SPREAD_M, SPREAD_RAD, SHARE, MIN_S = 0.25, np.radians(5.0), 0.8, 10.0
 #: A localizer that moved the belief by this much against its odometry was correcting it.
 CORRECTED_M, CORRECTED_RAD = 0.15, np.radians(4.0)
-#: A scan at the believed place that scores this part of what it scores at the right one fits.
-LOOKALIKE = 0.9
-_SCANS = 60
-
-Cause = Literal["map", "map_or_start", "lookalike"]
-
-
-@dataclass(frozen=True)
-class ConstantOffset:
-    """Belief = offset after hindsight, all along.
-
-    Attributes:
-        xyyaw: (3,) the transform, in the map frame: m, m, rad.
-        at_robot_m: median distance it makes where the robot was.
-        at_robot_rad: its turn.
-        spread_m: nine of ten rows stay within this of it.
-        cause: map, map_or_start (both explain it equally) or lookalike (the robot was lost).
-    """
-
-    xyyaw: tuple[float, float, float]
-    at_robot_m: float
-    at_robot_rad: float
-    spread_m: float
-    cause: Cause
-
-    @property
-    def text(self) -> str:
-        """The offset in words."""
-        turn = np.degrees(self.xyyaw[2])
-        return f"x {self.xyyaw[0]:+.2f} m, y {self.xyyaw[1]:+.2f} m, {turn:+.1f} deg"
 
 
 def constant_offset(view: BundleView, error: BeliefError, limits: Limits) -> ConstantOffset | None:
@@ -77,7 +45,7 @@ def constant_offset(view: BundleView, error: BeliefError, limits: Limits) -> Con
         return None
     cause: Cause = "map_or_start"
     if _corrected(view, error, rows, spread_m):
-        cause = "lookalike" if _fits_at_belief(view, error, rows) else "map"
+        cause = "lookalike" if fits_at_belief(view, error, rows) else "map"
     whole = (float(offset[0]), float(offset[1]), float(offset[2]))
     return ConstantOffset(whole, at_robot_m, at_robot_rad, spread_m, cause)
 
@@ -115,33 +83,3 @@ def _corrected(view: BundleView, error: BeliefError, rows: np.ndarray, spread_m:
     turned = np.abs(se2.wrap_angle(believed[:, 2] - carried[:, 2]))
     far = float(np.quantile(moved, 0.9)) > max(CORRECTED_M, 3.0 * spread_m)
     return bool(far or np.quantile(turned, 0.9) > CORRECTED_RAD)
-
-
-def _fits_at_belief(view: BundleView, error: BeliefError, rows: np.ndarray) -> bool:
-    """Whether the scans fit this map at the believed poses as well as at hindsight's."""
-    from slamreplay.maps.likelihood_field import gaussian_field
-
-    scans, grid = scan_set(view), view.grid
-    if scans is None or grid is None:
-        return False
-    field = gaussian_field(grid, 0.12, 1.0)
-    index = np.flatnonzero(rows)
-    index = index[np.linspace(0, len(index) - 1, min(_SCANS, len(index))).astype(int)]
-    scores = []
-    for i in index:
-        k = int(np.searchsorted(scans.t_ns, error.t_ns[i]))
-        if k >= len(scans) or scans.t_ns[k] != error.t_ns[i]:
-            continue
-        points = scans.points(k)
-        if not len(points):
-            continue
-        pair = []
-        for pose in (error.belief[i], error.where[i]):
-            cell = grid.cell_of(se2.transform_points(pose, points))
-            inside = grid.inside(cell)
-            pair.append(float(field[cell[inside, 0], cell[inside, 1]].sum()) / len(points))
-        scores.append(pair)
-    if not scores:
-        return False
-    at_belief, at_hindsight = np.mean(scores, axis=0)
-    return bool(at_belief >= LOOKALIKE * at_hindsight)

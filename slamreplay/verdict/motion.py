@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,6 +26,13 @@ REPEAT_NS = 2 * NS_PER_S
 #: choose among recoveries.
 NAVIGATION = ("NavigateRecovery",)
 WRAPPERS = ("RecoveryFallback", "RecoveryActions", "ClearingActions")
+#: What safety devices, bumpers and their drivers write into the log, and how they take it back.
+_PROTECTIVE = re.compile(
+    r"protective|emergency|e-?stop\b|safety (stop|field|zone)|bumper|cliff|collision detected",
+    re.IGNORECASE,
+)
+_RELEASED = re.compile(r"releas|clear|reset|\bok\b|\binactive\b|\bnot? ", re.IGNORECASE)
+_ABORTED = ("failure", "failed", "aborted")
 _FINISHED = ("success", "succeeded", "failure", "failed", "aborted", "canceled", "idle")
 
 
@@ -139,6 +147,24 @@ def navigations(view: BundleView) -> tuple[Span, ...] | None:
     if begun is not None:
         found.append(Span(begun, max(view.manifest.end_ns, begun)))
     return tuple(found)
+
+
+def aborted(view: BundleView) -> tuple[int, ...]:
+    """Times at which a navigation ended without success."""
+    table = view.table("recoveries").sorted_by_time()
+    table = table.take(np.isin(table["name"].astype(str), NAVIGATION))
+    status = np.char.lower(table["status"].astype(str)) if len(table) else np.zeros(0, dtype=str)
+    return tuple(table.t_ns[np.isin(status, _ABORTED)].tolist())
+
+
+def protections(view: BundleView, low_ns: int, high_ns: int) -> str | None:
+    """What a safety device said between two times, None where none spoke up."""
+    table = view.table("health")
+    table = table.take((table.t_ns >= low_ns) & (table.t_ns <= high_ns)).sorted_by_time()
+    for message, name in zip(table["message"], table["name"], strict=True):
+        if _PROTECTIVE.search(str(message)) and not _RELEASED.search(str(message)):
+            return f"{name}: {message}".strip(": ")[:80]
+    return None
 
 
 def motion_starts(view: BundleView, otherwise: PoseTrack | None) -> tuple[int, ...]:

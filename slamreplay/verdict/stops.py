@@ -12,16 +12,19 @@ from slamreplay.bundle.view import BundleView
 from slamreplay.geometry import se2, se3
 from slamreplay.geometry.times import NS_PER_S
 from slamreplay.geometry.transforms import clean_frame
-from slamreplay.verdict.judgement import Interval, State, Stop
+from slamreplay.verdict.judgement import FailureMode, Interval, State, Stop
 from slamreplay.verdict.motion import (
     STOP_NS,
     Span,
+    aborted,
     commanded,
     moved_by,
     navigations,
+    protections,
     recoveries,
     rests,
 )
+from slamreplay.verdict.words import BECAUSE
 
 #: A recovery this soon after the robot came to rest, or this shortly before, belongs to the stop.
 RECOVERY_AFTER_NS, RECOVERY_BEFORE_NS = 10 * NS_PER_S, 3 * NS_PER_S
@@ -29,6 +32,9 @@ RECOVERY_AFTER_NS, RECOVERY_BEFORE_NS = 10 * NS_PER_S, 3 * NS_PER_S
 ARRIVED_M = 0.5
 #: Stops nearer to each other than this are one: recoveries stir the robot without freeing it.
 SAME_PLACE_M = 0.5
+#: What a safety device says this shortly before a stop made it; a goal aborted this near to it
+#: belongs to it.
+GUARD_NS, ABORTED_NS = 2 * NS_PER_S, 3 * NS_PER_S
 #: Commands that asked for motion during this share of the stop's first seconds went unheeded.
 UNHEEDED = 0.5
 
@@ -38,6 +44,7 @@ def stops(
     belief: PoseTrack | None,
     where: PoseTrack | None,
     intervals: Sequence[Interval],
+    mode: FailureMode | None = None,
 ) -> tuple[Stop, ...]:
     """Every stop before arrival, in time order.
 
@@ -46,6 +53,7 @@ def stops(
         belief: base in map as believed.
         where: base in map as it was.
         intervals: the verdict's, for the state of the moment.
+        mode: how the loss began, for the first cause.
     """
     track = moved_by(view, where if where is not None else belief)
     if track is None:
@@ -60,7 +68,7 @@ def stops(
         interval = _at(intervals, rest.start_ns)
         state: State = "insufficient_data" if interval is None else interval.state
         x, y = _place((where, belief), rest.start_ns)
-        cause = _cause(intervals, interval, view.manifest.start_ns, reason)
+        cause = _cause(intervals, interval, view.manifest.start_ns, reason, mode)
         found.append(Stop(rest.start_ns, x, y, state, cause))
     return tuple(found)
 
@@ -109,20 +117,27 @@ def _reason(
     active: Sequence[Span] | None,
 ) -> str | None:
     """Why a rest is no arrival; None where it may be one."""
+    by = protections(view, rest.start_ns - GUARD_NS, rest.start_ns + NS_PER_S)
+    if by is not None:
+        return f"a protective stop: '{by}'"
+    failed = [t for t in aborted(view) if abs(t - rest.start_ns) <= ABORTED_NS]
+    if failed:
+        return "its goal was aborted"
     told = commanded(view)
     if told is not None:
         t_ns, moving = told
         inside = (t_ns >= rest.start_ns + NS_PER_S // 2) & (t_ns < rest.end_ns)
         if inside.any() and moving[inside].mean() >= UNHEEDED:
             return "it was told to move on and did not: blocked, or its drive was off"
+    halt = "" if told is None else "it was commanded to stop, and "
     if active is not None:
         goal = any(
             a.start_ns < rest.start_ns and rest.start_ns + STOP_NS < a.end_ns for a in active
         )
-        return "its goal was still active" if goal else None
+        return f"{halt}its goal was still active" if goal else None
     short = _short_of_goal_m(view, rest, belief, track)
     if short is not None and short > ARRIVED_M:
-        return f"it was still {short:.1f} m short of the end of its plan"
+        return f"{halt}it was still {short:.1f} m short of the end of its plan"
     return None
 
 
@@ -167,17 +182,26 @@ def _place(tracks: Sequence[PoseTrack | None], t_ns: int) -> tuple[float | None,
 
 
 def _cause(
-    intervals: Sequence[Interval], interval: Interval | None, start_ns: int, reason: str
+    intervals: Sequence[Interval],
+    interval: Interval | None,
+    start_ns: int,
+    reason: str,
+    mode: FailureMode | None,
 ) -> str:
     """What came first: being lost or the changed map, else what the log says of the stop itself."""
     if interval is None or not (interval.is_lost or interval.is_changed):
         return reason
     parts = []
     if interval.is_lost:
-        parts.append((since(intervals, interval, lost=True), "it was lost"))
+        why = "" if mode is None else BECAUSE.get(mode.kind, "")
+        parts.append((since(intervals, interval, lost=True), "it was lost", why))
     if interval.is_changed:
-        parts.append((since(intervals, interval, lost=False), "what it saw contradicted the map"))
-    words = [f"{text} since {(t - start_ns) / NS_PER_S:.1f} s" for t, text in sorted(parts)]
+        text = "what it saw contradicted the map"
+        parts.append((since(intervals, interval, lost=False), text, ""))
+    words = [
+        f"{text} since {(t - start_ns) / NS_PER_S:.1f} s{f' ({why})' if why else ''}"
+        for t, text, why in sorted(parts)
+    ]
     return f"{' and '.join(words)}; {reason}"
 
 

@@ -8,17 +8,19 @@ import numpy as np
 
 from slamreplay.bundle.products import Changes
 from slamreplay.geometry.times import NS_PER_S
-from slamreplay.verdict.judgement import FailureMode, Interval, State, Stop
-from slamreplay.verdict.map_frame import ConstantOffset
+from slamreplay.verdict.judgement import ConstantOffset, FailureMode, Interval, State, Stop
+from slamreplay.verdict.words import BECAUSE
 
-_BECAUSE = {
-    "wrong_initial_pose": "it was wrong from the first pose on",
-    "odometry_slip": "its wheels slipped",
-    "kidnapped": "it was moved without its wheels turning",
-    "association_error": "it took one place for another",
-    "stale_map_use": "it trusted a map that was no longer true",
-    "overconfidence": "it was surer of itself than it had reason to be",
-}
+#: Nobody reads more at the start of a shift; what does not fit is left to the page.
+MOST_CHARACTERS = 200
+_AMBIGUOUS = (
+    "It cannot be told where the robot was: more than one place in the map explains the whole log "
+    "equally well"
+)
+_UNSPOKEN = (
+    "The map was right; whether the robot was lost cannot be told, for it did not record where it "
+    "believed to be"
+)
 
 
 def summary(
@@ -33,7 +35,7 @@ def summary(
     has_belief: bool,
     reason: str | None,
 ) -> str:
-    """The sentence.
+    """The sentence, of at most `MOST_CHARACTERS`: clauses that do not fit are left out.
 
     Args:
         state: of the log.
@@ -46,117 +48,111 @@ def summary(
         has_belief: whether a localizer spoke at all.
         reason: why nothing could be judged, where that is so.
     """
-    text = _what(state, intervals, mode, changes, offset, start_ns, has_belief, reason)
+    clauses = _clauses(
+        state, intervals, mode, changes, offset, start_ns, has_belief=has_belief, reason=reason
+    )
     if stops and state not in ("insufficient_data", "unobservable"):
-        text += f"; {_stopped(stops, start_ns)}"
+        clauses.insert(1, _stopped(stops, start_ns))
+    text = clauses[0]
+    for clause in clauses[1:]:
+        if len(text) + len(clause) + 3 <= MOST_CHARACTERS:
+            text = f"{text}; {clause}"
     return f"{text}."
 
 
-def _what(
+def _clauses(
     state: State,
     intervals: Sequence[Interval],
     mode: FailureMode,
     changes: Changes | None,
     offset: ConstantOffset | None,
     start_ns: int,
+    *,
     has_belief: bool,
     reason: str | None,
-) -> str:
+) -> list[str]:
+    """The answer first, then what else there is to say, the weightier before the lighter."""
+    changed = _changed(intervals, start_ns)
+    where = _where(changes)
     if state == "insufficient_data":
-        return (
-            f"It cannot be told whether the robot was lost: {reason or 'too little was recorded'}"
-        )
+        text = f"It cannot be told whether the robot was lost: {reason or 'too little recorded'}"
+        return [text]
     if state == "unobservable":
-        return (
-            "It cannot be told where the robot was: more than one place in the map explains the "
-            "whole log equally well"
-        )
+        return [_AMBIGUOUS]
     if offset is not None and offset.cause == "map":
         text = (
-            f"The map frame is off, the robot was not lost: everything it believed is shifted by "
-            f"the same {offset.text}"
+            "The map frame is off, the robot was not lost: all it believed is shifted by "
+            f"{offset.text}"
         )
-        changed = _changed(intervals, changes, start_ns)
-        return f"{text}; {changed}" if state == "map_changed" else text
-    if state == "lost":
-        return f"The robot was lost: {_lost(intervals, mode, offset, start_ns)}"
+        return [text, *([changed, *where] if state == "map_changed" else [])]
+    if state in ("lost", "lost_and_map_changed"):
+        both = state == "lost_and_map_changed"
+        text = "The robot was lost and the aisle had changed" if both else "The robot was lost"
+        why = BECAUSE.get(mode.kind, "")
+        same = offset is not None and offset.cause == "map_or_start"
+        return [
+            f"{text}{f', for {why}' if why else ''}: {_lost(intervals, start_ns)}",
+            *(["a map shifted by that much would look the same"] if same else []),
+            *([changed, *where] if both else []),
+        ]
     if state == "map_changed":
         knew = (
-            "The robot knew where it was"
+            f"The robot knew where it was{_within(intervals)}"
             if has_belief
-            else "Whether the robot was lost cannot be told without a belief"
+            else "Whether it was lost cannot be told without a belief"
         )
-        return f"{knew}{_within(intervals)}, but {_changed(intervals, changes, start_ns)}"
-    if state == "lost_and_map_changed":
-        return (
-            f"The robot was lost and the aisle had changed: "
-            f"{_lost(intervals, mode, offset, start_ns)}; {_share(intervals, changes, start_ns)}"
-        )
+        return [f"{knew}, but the aisle had changed: {changed}", *where]
     if not has_belief:
-        return (
-            "The map was right; whether the robot was lost cannot be told, for it did not record "
-            "where it believed to be"
-        )
-    return f"The robot knew where it was{_within(intervals)} and the map was right"
+        return [_UNSPOKEN]
+    late = [mode.evidence[0]] if mode.kind == "timing" and mode.evidence else []
+    return [f"The robot knew where it was{_within(intervals)} and the map was right", *late]
 
 
-def _lost(
-    intervals: Sequence[Interval],
-    mode: FailureMode,
-    offset: ConstantOffset | None,
-    start_ns: int,
-) -> str:
+def _lost(intervals: Sequence[Interval], start_ns: int) -> str:
     lost = [i for i in intervals if i.is_lost]
     total = sum(i.duration_ns for i in lost) / NS_PER_S
     metres = max((i.max_error_m or 0.0 for i in lost), default=0.0)
     radians = max((i.max_error_rad or 0.0 for i in lost), default=0.0)
     begin, end = ((t - start_ns) / NS_PER_S for t in (lost[0].start_ns, lost[-1].end_ns))
     far = f"{metres:.1f} m" if metres >= 0.5 else f"{np.degrees(radians):.0f} degrees"
-    text = f"from {begin:.1f} s to {end:.1f} s its belief was up to {far} off"
-    if end - begin > total + 0.1:
-        text += f", for {total:.1f} s in all"
-    if mode.kind in _BECAUSE:
-        text += f"; {_BECAUSE[mode.kind]}"
-    if offset is not None and offset.cause == "map_or_start":
-        text += f"; a map shifted by {offset.text} would look the same"
-    return text
+    for_ = f" ({total:.0f} s in all)" if end - begin > total + 1.0 else ""
+    return f"from {begin:.1f} to {end:.1f} s{for_} it was up to {far} from where it believed to be"
 
 
-def _changed(intervals: Sequence[Interval], changes: Changes | None, start_ns: int) -> str:
-    return f"the aisle had changed: {_share(intervals, changes, start_ns)}"
-
-
-def _share(intervals: Sequence[Interval], changes: Changes | None, start_ns: int) -> str:
+def _changed(intervals: Sequence[Interval], start_ns: int) -> str:
     changed = [i for i in intervals if i.is_changed]
-    if not changed or changes is None:
-        return "the world differed from the map"
+    if not changed:
+        return "what it saw contradicts the map"
     begin, end = ((t - start_ns) / NS_PER_S for t in (changed[0].start_ns, changed[-1].end_ns))
-    share = changes.changed_share[np.isfinite(changes.changed_share)]
-    most = 100.0 * float(share.max()) if len(share) else 0.0
-    text = (
-        f"from {begin:.1f} s to {end:.1f} s up to {most:.0f} % of what it saw contradicts the map"
-    )
-    if changes.regions:
-        region = max(changes.regions, key=lambda r: r.area_m2)
-        x, y = (region.bbox_m[0] + region.bbox_m[2]) / 2, (region.bbox_m[1] + region.bbox_m[3]) / 2
-        text += f", most of all around x {x:.1f} m, y {y:.1f} m"
-    return text
+    return f"from {begin:.1f} to {end:.1f} s what it saw contradicts the map"
+
+
+def _where(changes: Changes | None) -> list[str]:
+    if changes is None or not changes.regions:
+        return []
+    region = max(changes.regions, key=lambda r: r.area_m2)
+    x, y = (region.bbox_m[0] + region.bbox_m[2]) / 2, (region.bbox_m[1] + region.bbox_m[3]) / 2
+    return [f"most of all at x {x:.1f} m, y {y:.1f} m"]
 
 
 def _within(intervals: Sequence[Interval]) -> str:
+    """How well it knew: typically, or but for the time it was lost; nothing where that misleads."""
     errors = [i.max_error_m for i in intervals if i.max_error_m is not None and not i.is_lost]
     lost = sum(i.duration_ns for i in intervals if i.is_lost) / NS_PER_S
-    text = f" (to within {max(errors):.2f} m)" if errors else ""
-    return f"{text} but for {lost:.1f} s" if lost else text
+    if lost >= 0.1:
+        return f" but for {lost:.1f} s"
+    # A moment too short to be lost may lie beyond the limit: that is no praise.
+    close = bool(errors) and max(errors) <= 0.5
+    return f" (to within {max(errors):.2f} m)" if close else ""
 
 
 def _stopped(stops: Sequence[Stop], start_ns: int) -> str:
     first = stops[0]
     was = {
-        "lost": "lost",
-        "map_changed": "not lost, in a changed aisle",
-        "lost_and_map_changed": "lost in a changed aisle",
-        "healthy": "not lost",
-    }.get(first.state, "in a state that cannot be judged")
-    text = f"when it stopped at {(first.t_ns - start_ns) / NS_PER_S:.1f} s it was {was}"
-    return text if len(stops) == 1 else f"{text} (the first of {len(stops)} unplanned stops)"
+        "lost": "it was lost",
+        "map_changed": "it was not lost",
+        "lost_and_map_changed": "it was lost in a changed aisle",
+        "healthy": "it was not lost",
+    }.get(first.state, "its state cannot be judged")
+    more = "" if len(stops) == 1 else f", first of {len(stops)} stops"
+    return f"when it stopped at {(first.t_ns - start_ns) / NS_PER_S:.1f} s {was}{more}"

@@ -15,10 +15,11 @@ from slamreplay.geometry.times import ns
 from slamreplay.verdict.belief_error import BeliefError, belief_error
 from slamreplay.verdict.confidence import confidence, p_changed, p_off, trust
 from slamreplay.verdict.intervals import tiled
-from slamreplay.verdict.judgement import Interval
+from slamreplay.verdict.judgement import ConstantOffset, Interval
 from slamreplay.verdict.limits import Limits
-from slamreplay.verdict.map_frame import ConstantOffset, constant_offset
+from slamreplay.verdict.map_frame import constant_offset
 from slamreplay.verdict.timeline import BAD, GOOD, UNKNOWN, held, settled
+from slamreplay.verdict.timing import Delay
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,10 +33,20 @@ class Evidence:
 
 
 def gathered(
-    view: BundleView, belief: PoseTrack | None, hindsight: Hindsight, limits: Limits
+    view: BundleView,
+    belief: PoseTrack | None,
+    hindsight: Hindsight,
+    limits: Limits,
+    delay: Delay | None = None,
 ) -> Evidence:
-    """Belief against hindsight; where the map alone is off, in the map the robot had."""
-    error = belief_error(belief, hindsight, limits)
+    """Belief against hindsight; where the map alone is off, in the map the robot had.
+
+    Scans that are stamped late show where the robot was before their stamps: the belief is asked
+    for that time, or a right one would be called wrong by what the robot drove meanwhile.
+    """
+    late = delay is not None and delay.is_significant and delay.seconds > 0.0
+    late_ns = ns(delay.seconds) if delay is not None and late and delay.late != "odometry" else 0
+    error = belief_error(belief, hindsight, limits, late_ns)
     offset = constant_offset(view, error, limits)
     if offset is not None and offset.cause == "map" and belief is not None:
         # The robot was right in a map that lies elsewhere: judge it in that map.
@@ -47,7 +58,7 @@ def gathered(
             se2.compose(back, belief.xyyaw),
             belief.cov,
         )
-        error = belief_error(moved, hindsight, limits)
+        error = belief_error(moved, hindsight, limits, late_ns)
     return Evidence(error, hindsight.changes, offset, trust(hindsight))
 
 

@@ -1,0 +1,385 @@
+"""How it began, what the clocks and the wheels did, and the belief that actions were built on."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from slamreplay.bundle.belief import recorded_belief
+from slamreplay.bundle.odometry import odometry_track
+from slamreplay.bundle.products import ChangedRegion, Changes, Hindsight
+from slamreplay.bundle.schema import TABLES
+from slamreplay.bundle.tables import Table
+from slamreplay.bundle.track import PoseTrack
+from slamreplay.geometry import se2, se3
+from slamreplay.geometry.times import ns
+from slamreplay.ingest.pipeline import ingest
+from slamreplay.perturb.scan_delay import ScanDelay
+from slamreplay.perturb.tf_delay import TfDelay
+from slamreplay.testing.synthetic import START_NS, room_grid, synthetic_bundle, true_path
+from slamreplay.verdict.actions import Outcome, actions, risky
+from slamreplay.verdict.belief_error import belief_error
+from slamreplay.verdict.contract import contract_findings
+from slamreplay.verdict.judge import judge
+from slamreplay.verdict.limits import Limits
+from slamreplay.verdict.summary import MOST_CHARACTERS
+from slamreplay.verdict.timing import scan_delay
+from slamreplay.verdict.wheels import wheels
+
+LIMITS = Limits()
+SAMPLES = Path(__file__).parents[1] / "sample_logs"
+
+
+def at_scans(bundle):
+    return bundle.view().role("scan").t_ns
+
+
+def hindsight_of(bundle, *, xyyaw=None, match=0.95, margin=0.3, sigma=0.03, shares=None):
+    """Hindsight as good as one could wish, unless told otherwise."""
+    t = at_scans(bundle)
+    n = len(t)
+    xyyaw = true_path((t - START_NS) / 1e9) if xyyaw is None else xyyaw
+    cov = np.tile(np.diag([sigma**2, sigma**2, 0.01**2]), (n, 1, 1))
+    shares = np.zeros(n) if shares is None else np.asarray(shares, dtype=float)
+    region = ChangedRegion("appeared", (1.0, 2.0, 2.0, 3.0), 0.8, START_NS, START_NS, 9, 0.9)
+    cells = np.zeros(room_grid().cells.shape, dtype=bool)
+    changes = Changes(
+        cells, cells, (region,) if shares.any() else (), t, shares, shares, np.zeros(n)
+    )
+    track = PoseTrack("map", "base_link", t, xyyaw, cov)
+    return Hindsight(track, sigma, 1.0, np.broadcast_to(float(match), n), margin, changes)
+
+
+def shares_between(bundle, low_s, high_s, share):
+    t = (at_scans(bundle) - START_NS) / 1e9
+    return np.where((t >= low_s) & (t < high_s), share, 0.0)
+
+
+def dead_reckoned(bundle):
+    """The belief of a robot that trusts its wheels from the true start on."""
+    t = at_scans(bundle)
+    odom = odometry_track(bundle.view()).at(t).xyyaw
+    start = true_path(np.zeros(1))[0]
+    xyyaw = se2.compose(start, se2.between(odom[0], odom))
+    return PoseTrack.without_covariance("map", "base_link", t, xyyaw)
+
+
+def rows(table, t_s, **columns):
+    t = START_NS + np.array([ns(s) for s in t_s], dtype=np.int64)
+    times = {"t_ns": t, "t_sensor_ns": t, "t_log_ns": t}
+    columns = {"topic": [f"/{table}"] * len(t), **columns}
+    return Table(TABLES[table], {**times, **columns})
+
+
+def recovering(t_s, name="Spin", status="running"):
+    return rows(
+        "recoveries",
+        t_s,
+        name=[name] * len(t_s),
+        status=[status] * len(t_s),
+        source=["behavior_tree"] * len(t_s),
+    )
+
+
+def standing(bundle, from_s, until_s):
+    """The bundle's view with an odometry that rests for a while and then goes on."""
+    table = bundle.table("transforms")
+    t = (table.t_ns - START_NS) / 1e9
+    odom = np.flatnonzero(table["child_frame"] == "base_link")
+    held_s = np.where(t < from_s, t, np.maximum(from_s, t - (until_s - from_s)))
+    path = true_path(held_s[odom])
+    position = table["translation_xyz"].copy()
+    rotation = table["rotation_xyzw"].copy()
+    position[odom, :2] = path[:, :2]
+    rotation[odom] = se3.quaternion_from_yaw(path[:, 2])
+    return bundle.view().with_table(table.replace(translation_xyz=position, rotation_xyzw=rotation))
+
+
+def judged(bundle, hindsight=None):
+    view = bundle.view()
+    hindsight = hindsight_of(bundle) if hindsight is None else hindsight
+    return judge(view, recorded_belief(view, at_scans(bundle)), hindsight)
+
+
+# --- clocks ----------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def drive(tmp_path_factory):
+    """A simulated log with real turns, and where the robot really was as hindsight."""
+    bundle = ingest([SAMPLES / "healthy.mcap"], tmp_path_factory.mktemp("late") / "b")
+    truth = bundle.table("references")
+    yaw = se3.yaw_from_quaternion(truth["orientation_xyzw"])
+    xyyaw = np.column_stack([truth["position_xyz"][:, :2], yaw])
+    return bundle, PoseTrack.without_covariance("map", "base_link", truth.t_ns, xyyaw)
+
+
+def seen_from(view, truth, late_s=0.0):
+    """Hindsight of scans that were taken `late_s` before their stamps."""
+    t = view.role("scan").t_ns
+    poses = truth.at(t - ns(late_s)).xyyaw
+    cov = np.tile(np.diag([1e-3, 1e-3, 1e-4]), (len(t), 1, 1))
+    track = PoseTrack("map", "base_link", t, poses, cov)
+    return Hindsight(track, 0.03, 1.0, np.full(len(t), 0.95), 0.3, None)
+
+
+@pytest.mark.parametrize("late_s", [0.08, 0.3])
+def test_late_scans_are_measured_in_milliseconds(drive, late_s):
+    bundle, truth = drive
+    view = ScanDelay().apply(bundle.view(), "stamp", late_s, np.random.default_rng(0))
+    delay = scan_delay(view, seen_from(view, truth, late_s))
+
+    assert delay.seconds == pytest.approx(late_s, abs=0.02)
+    assert (delay.late, delay.is_significant, delay.sigma_s < 0.01) == ("scans", True, True)
+    assert f"{1e3 * delay.seconds:.0f} ms" in delay.text
+
+
+def test_late_odometry_is_told_from_late_scans_by_the_imu(drive):
+    bundle, truth = drive
+    view = TfDelay().apply(bundle.view(), "odometry", 0.15, np.random.default_rng(0))
+    delay = scan_delay(view, seen_from(view, truth))
+
+    assert delay.seconds == pytest.approx(-0.15, abs=0.02)
+    assert (delay.late, delay.witness) == ("odometry", "IMU")
+
+
+def test_a_log_in_time_has_no_delay_and_a_log_without_turns_says_nothing(drive):
+    bundle, truth = drive
+    delay = scan_delay(bundle.view(), seen_from(bundle.view(), truth))
+    ellipse = synthetic_bundle()
+
+    assert not delay.is_significant
+    assert abs(delay.seconds) < 0.015
+    assert scan_delay(ellipse.view(), hindsight_of(ellipse)) is None
+
+
+def test_late_stamps_alone_make_nobody_lost(drive):
+    bundle, truth = drive
+    late_s = 0.4
+    view = ScanDelay().apply(bundle.view(), "stamp", late_s, np.random.default_rng(0))
+    belief = recorded_belief(view, view.role("scan").t_ns)
+    hindsight = seen_from(view, truth, late_s)
+    judgement = judge(view, belief, hindsight)
+    blind = belief_error(belief, hindsight, LIMITS)
+    told = belief_error(belief, hindsight, LIMITS, ns(late_s))
+
+    assert (judgement.state, judgement.failure_mode.kind) == ("healthy", "timing")
+    assert "SR-CLK-002" in [f.id for f in judgement.findings]
+    assert np.nanmedian(told.distance_m) < 0.6 * np.nanmedian(blind.distance_m)
+
+
+# --- wheels ----------------------------------------------------------------------------------
+
+
+def test_slip_says_when_how_far_and_in_which_way():
+    bundle = synthetic_bundle(seconds=30)
+    t = (at_scans(bundle) - START_NS) / 1e9
+    slow = np.interp(t, [0, 10, 14, 40], [0, 10, 11.3, 37.3])
+    hindsight = hindsight_of(bundle, xyyaw=true_path(slow))
+    found = wheels(bundle.view(), belief_error(dead_reckoned(bundle), hindsight, LIMITS))
+    slip = found.slips[0]
+
+    assert slip.model == "spinning"
+    assert (slip.start_ns - START_NS) / 1e9 == pytest.approx(10.0, abs=0.6)
+    assert (slip.end_ns - START_NS) / 1e9 == pytest.approx(14.0, abs=0.6)
+    assert slip.counted_m - slip.moved_m == pytest.approx(0.5 * 2.7, abs=0.3)
+    assert found.calibration_words == ()
+
+
+def test_a_turn_that_wheels_do_not_see_is_rotational_slip():
+    bundle = synthetic_bundle(seconds=30)
+    t = (at_scans(bundle) - START_NS) / 1e9
+    path = true_path(t)
+    turn = np.interp(t, [0, 12, 13, 40], [0, 0, 0.5, 0.5])
+    pivot = path[120]
+    turned = se2.compose(
+        pivot, se2.compose(np.column_stack([0 * t, 0 * t, turn]), se2.between(pivot, path))
+    )
+    hindsight = hindsight_of(bundle, xyyaw=turned)
+    found = wheels(bundle.view(), belief_error(dead_reckoned(bundle), hindsight, LIMITS))
+
+    assert [s.model for s in found.slips] == ["turning"]
+    assert found.slips[0].radians == pytest.approx(0.5, abs=0.1)
+
+
+def test_a_wrong_scale_is_calibration_and_no_slip():
+    bundle = synthetic_bundle(seconds=60)
+    hindsight = hindsight_of(bundle)
+    track = hindsight.track
+    longer = track.xyyaw * np.array([1.1, 1.1, 1.0])
+    hindsight = replace(
+        hindsight, track=PoseTrack("map", "base_link", track.t_ns, longer, track.cov)
+    )
+    found = wheels(bundle.view(), belief_error(None, hindsight, LIMITS))
+
+    assert found.slips == ()
+    assert found.scale == pytest.approx(1 / 1.1, abs=0.02)
+    assert "too little way" in found.calibration_words[0]
+
+
+# --- how it began ----------------------------------------------------------------------------
+
+
+def test_a_start_just_over_the_limit_is_no_confident_accusation():
+    bundle = synthetic_bundle(seconds=30)
+    t = (at_scans(bundle) - START_NS) / 1e9
+    belief = recorded_belief(bundle.view(), at_scans(bundle))
+    off = np.where(t < 6.0, 0.52, 0.1)
+    near = PoseTrack(
+        "map", "base_link", belief.t_ns, true_path(t) + np.outer(off, [1, 0, 0]), belief.cov
+    )
+    far = PoseTrack(
+        "map",
+        "base_link",
+        belief.t_ns,
+        true_path(t) + np.outer(np.where(t < 20, 2.0, 0.0), [1, 0, 0]),
+        belief.cov,
+    )
+    mild = judge(bundle.view(), near, hindsight_of(bundle)).failure_mode
+    grave = judge(bundle.view(), far, hindsight_of(bundle)).failure_mode
+
+    assert mild.confidence < 0.5
+    assert "just over the limit" in " ".join(mild.evidence)
+    assert grave.kind == "wrong_initial_pose"
+    assert grave.confidence == 0.9
+
+
+def test_the_episode_that_tells_most_names_the_cause():
+    bundle = synthetic_bundle(seconds=40)
+    t = (at_scans(bundle) - START_NS) / 1e9
+    ahead = np.where(t >= 20, t + 5, t)
+    belief = dead_reckoned(bundle)
+    wobble = np.where(t < 5.0, 0.55, 0.0)
+    belief = replace(belief, xyyaw=belief.xyyaw + np.outer(wobble, [1, 0, 0]))
+    judgement = judge(bundle.view(), belief, hindsight_of(bundle, xyyaw=true_path(ahead)))
+
+    assert judgement.failure_mode.kind == "kidnapped"
+
+
+def test_a_change_where_the_belief_left_the_truth_comes_before_a_wrong_match():
+    bundle = synthetic_bundle(
+        belief_offset_xyyaw=(1.0, 0.5, 0.0), offset_from_s=8.0, with_initial_pose=False
+    )
+    plain = judged(bundle)
+    changed = judged(bundle, hindsight_of(bundle, shares=shares_between(bundle, 5, 15, 0.3)))
+
+    assert plain.failure_mode.kind == "association_error"
+    assert changed.failure_mode.kind == "stale_map_use"
+    assert any("m² appeared" in line for line in changed.failure_mode.evidence)
+
+
+def test_summaries_are_short_and_do_not_contradict_themselves():
+    bundle = synthetic_bundle(belief_offset_xyyaw=(1.0, 0.5, 0.0), offset_from_s=8.0)
+    both = judged(bundle, hindsight_of(bundle, shares=shares_between(bundle, 5, 15, 0.3)))
+    brief = synthetic_bundle(seconds=60)
+    t = (at_scans(brief) - START_NS) / 1e9
+    belief = recorded_belief(brief.view(), at_scans(brief))
+    jumped = belief.xyyaw + np.outer(np.where((t > 8) & (t < 10), 1.9, 0.0), [1, 0, 0])
+    told = judge(brief.view(), replace(belief, xyyaw=jumped), hindsight_of(brief))
+
+    assert len(both.summary) <= MOST_CHARACTERS
+    assert told.state == "healthy"
+    assert "1.9" not in told.summary
+
+
+# --- the contract ----------------------------------------------------------------------------
+
+
+def test_each_action_tells_the_belief_it_consumed():
+    bundle = synthetic_bundle()
+    view = bundle.view().with_table(recovering([4.2, 12.0]))
+    belief = recorded_belief(view, at_scans(bundle))
+    first, _ = actions(view, belief, LIMITS)
+
+    assert first.belief.frame_id == "map"
+    assert first.belief.consumer == "behaviour Spin"
+    assert 0.0 <= first.belief.age_s <= 0.5
+    assert first.belief.t_ns == first.t_ns - ns(first.belief.age_s)
+    assert first.belief.sigma_xyyaw[:2] == pytest.approx([1e-3**0.5] * 2)
+    assert "stale" not in " ".join(first.belief.lacks)
+
+
+def test_a_stale_or_incomplete_belief_is_a_finding():
+    bundle = synthetic_bundle()
+    table = bundle.table("transforms")
+    silent = (table["child_frame"] == "odom") & (table.t_ns > START_NS + ns(6.0))
+    view = bundle.view().with_table(table.take(~silent)).with_table(recovering([12.0]))
+    belief = recorded_belief(view, at_scans(bundle))
+    bare = PoseTrack.without_covariance("map", "base_link", belief.t_ns, belief.xyyaw)
+    (action,) = actions(view, bare, LIMITS)
+    (finding,) = contract_findings((action,))
+    (none,) = actions(view, None, LIMITS)
+
+    assert action.belief.age_s == pytest.approx(6.0, abs=0.7)
+    assert {"no covariance"} < set(action.belief.lacks)
+    assert (finding.id, finding.severity) == ("SR-ACT-003", "warning")
+    assert "stale" in finding.message
+    assert none.belief.lacks[0] == "no belief"
+
+
+def test_recoveries_of_a_robot_that_was_right_are_needless():
+    bundle = synthetic_bundle(belief_offset_xyyaw=(1.0, 0.5, 0.0), offset_from_s=8.0)
+    view = bundle.view().with_table(recovering([4.0, 12.0]))
+    belief = recorded_belief(view, at_scans(bundle))
+    judgement = judge(view, belief, hindsight_of(bundle))
+
+    assert [a.needless for a in judgement.actions] == [True, False]
+    assert judgement.actions[1].error_m == pytest.approx(np.hypot(1.0, 0.5), abs=0.1)
+    assert "SR-ACT-005" in [f.id for f in judgement.findings]
+
+
+def test_a_false_covariance_lets_actions_pass_that_were_wrong():
+    bundle = synthetic_bundle(belief_offset_xyyaw=(-2.5, 0.0, 0.0), offset_from_s=8.0)
+    view = bundle.view().with_table(recovering([12.0]))
+    belief = recorded_belief(view, at_scans(bundle))
+    sure = PoseTrack("map", "base_link", belief.t_ns, belief.xyyaw, belief.cov * 0.01)
+    error = belief_error(sure, hindsight_of(bundle), LIMITS)
+    done = actions(view, sure, LIMITS, Outcome(error, ()))
+
+    assert [a.allowed for a in done] == [True]
+    assert [f.id for f in risky(done)] == ["SR-ACT-004"]
+
+
+def test_clearance_is_taken_along_the_way():
+    bundle = synthetic_bundle()
+    view = bundle.view().with_table(recovering([4.0]))
+    belief = recorded_belief(view, at_scans(bundle))
+    (going,) = actions(view, belief, LIMITS)
+    still = standing(bundle, 4.0, 18.0).with_table(recovering([4.0]))
+    staying = actions(still, recorded_belief(still, at_scans(bundle)), LIMITS)[0]
+
+    assert going.clearance_m < staying.clearance_m - 0.05
+
+
+# --- stops -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("message", "is_named"),
+    [("protective stop: front field", True), ("Emergency stop released", False)],
+)
+def test_a_protective_stop_is_named(message, is_named):
+    bundle = synthetic_bundle(seconds=30)
+    health = rows("health", [9.5], level=[2], name=["safety_plc"], message=[message])
+    view = standing(bundle, 10.0, 16.0).with_table(health)
+    view = view.with_table(recovering([1.0], "NavigateRecovery"))
+    (stop,) = judge(view, None, hindsight_of(bundle)).stops
+
+    assert ("protective stop" in stop.cause) is is_named
+
+
+def test_an_aborted_goal_is_a_first_cause():
+    bundle = synthetic_bundle(seconds=30)
+    view = standing(bundle, 10.0, 16.0)
+    view = view.with_table(recovering([10.5], "NavigateRecovery", "failure"))
+    (stop,) = judge(view, None, hindsight_of(bundle)).stops
+
+    assert "its goal was aborted" in stop.cause
+
+
+def test_what_was_lacking_is_said():
+    judgement = judged(synthetic_bundle())
+
+    assert any(line.startswith("no imu") for line in judgement.lacking)
+    assert not any(line.startswith("no map") for line in judgement.lacking)
