@@ -38,7 +38,9 @@ class Floor:
         cell = 0.1 if worlds[0].bounds[2] - worlds[0].bounds[0] < _LARGE_M else 0.2
         grids = [rasterise(w, cell, as_map=False) for w in worlds]
         x0, y0, x1, y1 = worlds[0].bounds
-        solid = np.stack([g.occupied for g in grids]).any(axis=0)
+        solid = grids[0].occupied.copy()
+        for grid in grids[1:]:
+            solid |= grid.occupied
         corner = grids[0].origin_xyyaw[:2]
         height, width = solid.shape
         xs = corner[0] + (np.arange(width) + 0.5) * cell
@@ -49,7 +51,9 @@ class Floor:
     def at(self, xy: se2.Array) -> se2.Array:
         """(N,) clearance of points (N, 2); 0 outside."""
         cells = np.floor((np.atleast_2d(xy) - self.corner) / self.cell_m).astype(np.int64)
-        inside = ((cells >= 0) & (cells < self.clearance.shape[::-1])).all(axis=1)
+        height, width = self.clearance.shape
+        col, row = cells.T
+        inside = (col >= 0) & (row >= 0) & (col < width) & (row < height)
         cells = np.where(inside[:, None], cells, 0)
         return np.where(inside, self.clearance[cells[:, 1], cells[:, 0]], 0.0)
 

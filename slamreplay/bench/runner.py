@@ -1,0 +1,124 @@
+"""The whole benchmark: cases on several processes, resumed where it stopped, and its figures."""
+
+from __future__ import annotations
+
+import json
+import traceback
+from collections.abc import Callable, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from slamreplay.bench.conditions import CONDITIONS
+from slamreplay.bench.incidents import KINDS
+from slamreplay.bench.measure import Measured, measured
+from slamreplay.bench.schedule import Case, Split, schedule
+from slamreplay.bench.scores import is_right, scores
+from slamreplay.bench.store import fingerprint, read_measured, write_measured
+from slamreplay.bench.table import page
+from slamreplay.bundle.atomic import check_target, write_file
+from slamreplay.errors import OutputError
+
+RESULTS, PAGE, LOGS = "results.json", "results.md", "logs"
+
+
+def run_benchmark(
+    target: Path,
+    *,
+    logs: int,
+    seed: int = 0,
+    split: Split = "held",
+    kinds: Sequence[str] = KINDS,
+    conditions: Sequence[str] = tuple(CONDITIONS),
+    jobs: int = 2,
+    progress: Callable[[str, float], None] | None = None,
+) -> dict[str, Any]:
+    """Judge incidents and write results.json and results.md; the results.
+
+    Logs that the same code has judged before in this folder are not judged again.
+
+    Raises:
+        OutputError: the folder is somebody else's or cannot be written.
+    """
+    check_target(target, RESULTS)
+    cases = schedule(logs, seed, split, kinds, conditions)
+    code = fingerprint()
+    folder = target / LOGS
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OutputError(f"cannot write: {error.strerror or error}", where=target) from error
+    # Written first: it marks the folder as ours, should the run be stopped.
+    write_file(target / RESULTS, json.dumps({"complete": False}).encode())
+    done = {c: m for c in cases if (m := read_measured(folder, c, code)) is not None}
+    todo = [c for c in cases if c not in done]
+    say = progress or (lambda _what, _share: None)
+    say(f"{len(done)} logs kept", len(done) / max(len(cases), 1))
+    for one in _judged(todo, jobs):
+        done[one.case] = one
+        write_measured(folder, one, code)
+        say(one.case.name, len(done) / len(cases))
+    found = [done[c] for c in cases]
+    results = results_of(found, seed, split)
+    write_file(target / PAGE, page(results).encode())
+    text = json.dumps(results, indent=1, allow_nan=False, sort_keys=True)
+    write_file(target / RESULTS, text.encode())
+    return results
+
+
+def results_of(found: Sequence[Measured], seed: int, split: Split) -> dict[str, Any]:
+    """All figures, over everything and by kind and condition, and what became of each case."""
+    plain = [m for m in found if not m.case.conditions]
+    kinds = [k for k in KINDS if any(m.case.kind == k for m in plain)]
+    hard = [c for c in CONDITIONS if any(c in m.case.conditions for m in found)]
+    return {
+        "complete": True,
+        "seed": seed,
+        "split": split,
+        "scores": scores(found),
+        "kinds": {k: scores([m for m in plain if m.case.kind == k]) for k in kinds},
+        "conditions": {c: scores([m for m in found if c in m.case.conditions]) for c in hard},
+        "cases": [_told(m) for m in found],
+    }
+
+
+def _judged(cases: Sequence[Case], jobs: int) -> Any:
+    """Each case as it is done, from processes of their own: a fresh interpreter per worker."""
+    if jobs <= 1:
+        yield from (measured_or_failed(c) for c in cases)
+        return
+    with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
+        for future in as_completed([pool.submit(measured_or_failed, c) for c in cases]):
+            yield future.result()
+
+
+def measured_or_failed(case: Case) -> Measured:
+    """A case judged; a fault of ours becomes its result, and the other cases go on."""
+    try:
+        return measured(case)
+    except Exception as error:  # whatever it is, it must stand in the table
+        text = f"{type(error).__name__}: {error} at {traceback.extract_tb(error.__traceback__)[-1]}"
+        return Measured(case, {"error": text, "judged": None, "state": None, "findings": []})
+
+
+def _told(one: Measured) -> dict[str, Any]:
+    case = one.case
+    said = {
+        "case": case.name,
+        "kind": case.kind,
+        "seed": case.seed,
+        "conditions": list(case.conditions),
+        "right": is_right(one),
+        **one.facts,
+    }
+    m = one.moments
+    if m:
+        for name in ("lost", "changed", "judged_lost", "judged_changed", "unjudged"):
+            said[f"{name}_share"] = float(m[name].mean())
+        error = m["error_m"][np.isfinite(m["error_m"])]
+        for name, q in (("median", 0.5), ("p95", 0.95)):
+            said[f"hindsight_{name}_m"] = float(np.quantile(error, q)) if len(error) else None
+    return said

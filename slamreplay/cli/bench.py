@@ -1,0 +1,80 @@
+"""`slamreplay bench`: how often the verdict is right on logs whose truth is known."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from slamreplay.cli.options import Json, Seed
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command."""
+    group = typer.Typer(help="Benchmarks on simulated logs of known truth.", rich_markup_mode=None)
+    group.command("verdict")(verdict)
+    # A group of one command would otherwise run it without its name.
+    group.callback()(_group)
+    app.add_typer(group, name="bench")
+
+
+def _group() -> None:
+    """Benchmarks on simulated logs of known truth."""
+
+
+def verdict(
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="Folder to write.")],
+    seed: Seed = 0,
+    logs: Annotated[
+        int | None, typer.Option("--logs", min=1, help="How many logs; 312 by default.")
+    ] = None,
+    train: Annotated[
+        bool, typer.Option("--train", help="Play the seeds that are there to develop with.")
+    ] = False,
+    kind: Annotated[
+        list[str] | None, typer.Option("--kind", help="Only this kind; several by repeating it.")
+    ] = None,
+    condition: Annotated[
+        list[str] | None,
+        typer.Option("--condition", help="Only this condition; several by repeating it."),
+    ] = None,
+    jobs: Annotated[int, typer.Option("--jobs", min=1, help="Processes.")] = 2,
+    as_json: Json = False,
+) -> None:
+    """Judge simulated incidents of every kind and compare with the truth.
+
+    Writes results.json and results.md; a run that was stopped goes on where it was. Held seeds are
+    played unless --train is given: nothing of the program is tuned on those.
+    """
+    from slamreplay.bench.conditions import CONDITIONS
+    from slamreplay.bench.incidents import KINDS
+    from slamreplay.bench.runner import PAGE, run_benchmark
+    from slamreplay.bench.schedule import DEFAULT_LOGS
+    from slamreplay.bench.table import page
+    from slamreplay.cli.progress import progress_bar
+    from slamreplay.errors import UsageError
+
+    for given, known in ((kind, KINDS), (condition, CONDITIONS)):
+        for name in given or ():
+            if name not in known:
+                raise UsageError(f"there is no '{name}'", hint=", ".join(known))
+    is_chosen = bool(kind or condition)
+    with progress_bar("benchmark") as progress:
+        results = run_benchmark(
+            output,
+            logs=logs or DEFAULT_LOGS,
+            seed=seed,
+            split="train" if train else "held",
+            kinds=kind or (() if is_chosen else KINDS),
+            conditions=condition or (() if is_chosen else tuple(CONDITIONS)),
+            jobs=jobs,
+            progress=progress,
+        )
+    if as_json:
+        import json
+
+        typer.echo(json.dumps(results["scores"], indent=1, allow_nan=False, sort_keys=True))
+    else:
+        typer.echo(page(results))
+        typer.echo(str(output / PAGE), err=True)
