@@ -8,6 +8,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from slamreplay.bundle.freshness import Freshness
 from slamreplay.bundle.track import PoseTrack
 from slamreplay.geometry import se2
 
@@ -44,6 +45,8 @@ class Changes:
         changed_share: (N,) changed beams over valid beams of each scan, NaN where none is valid.
         appeared_share: (N,) of it, nearer than the map says.
         removed_share: (N,) of it, beyond a mapped wall.
+        opened: (H, W) unmapped cells beside removed walls that were seen empty; None if not known.
+        freshness: when each cell was last confirmed and last contradicted.
     """
 
     appeared: NDArray[np.bool_]
@@ -53,6 +56,8 @@ class Changes:
     changed_share: se2.Array
     appeared_share: se2.Array
     removed_share: se2.Array
+    opened: NDArray[np.bool_] | None = None
+    freshness: Freshness | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -48,6 +48,14 @@ FailOn = Annotated[
         help="Exit with 1 on findings of info, warning or error, and of what is worse.",
     ),
 ]
+UpdateMap = Annotated[
+    Path | None,
+    typer.Option(
+        "--update-map",
+        metavar="YAML",
+        help="Write a corrected map here: a proposal that touches only what the log saw.",
+    ),
+]
 
 
 def register(app: typer.Typer) -> None:
@@ -66,6 +74,7 @@ def _report(
     reference: Reference = None,
     start_s: Start = None,
     end_s: End = None,
+    update_map: UpdateMap = None,
     fail_on: FailOn = None,
     as_json: Json = False,
 ) -> None:
@@ -73,6 +82,10 @@ def _report(
 
     threshold = _severity(fail_on)
     check_target(output, "report.json")  # before the work, not after it
+    if update_map is not None:
+        from slamreplay.report.map_proposal import check_proposal_target
+
+        check_proposal_target(update_map)
     options = ingest_options(
         map_yaml=map_yaml,
         topics=topics,
@@ -90,12 +103,24 @@ def _report(
         with progress_bar("looking back") as progress:
             post = postmortem(bundle, runs, progress=progress)
             page = write_report(post, output)
+        if update_map is not None:
+            _propose(post, update_map, map_yaml)
     if as_json:
         typer.echo(build(post).json_text(), nl=False)
     else:
         _summarise(post, page)
     if threshold is not None and any(f.severity in _from(threshold) for f in post.findings):
         raise typer.Exit(1)
+
+
+def _propose(post: Postmortem, target: Path, original: Path | None) -> None:
+    from slamreplay.report.map_proposal import write_proposal
+
+    if post.grid is None:
+        raise UsageError("there is no map to correct", hint="give the map with --map")
+    changes = None if post.hindsight is None else post.hindsight.changes
+    write_proposal(post.grid, changes, target, original)
+    typer.echo(f"corrected map: {target}", err=True)
 
 
 @contextmanager

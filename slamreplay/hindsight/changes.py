@@ -4,13 +4,20 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import binary_dilation, distance_transform_edt, maximum_filter, minimum_filter
+from scipy.ndimage import (
+    binary_dilation,
+    binary_propagation,
+    distance_transform_edt,
+    maximum_filter,
+    minimum_filter,
+)
 
 from slamreplay.bundle.products import Changes
 from slamreplay.geometry import se2
 from slamreplay.hindsight.beams import HIT, INVALID, MISS, Beams
 from slamreplay.hindsight.changed_beams import BEYOND, BEYOND_M, NEARER, SILENT, BeamsOnMap, on_map
 from slamreplay.hindsight.evidence import BIN_S, Lattice, lattice, passes
+from slamreplay.hindsight.freshness import freshness_of
 from slamreplay.hindsight.gone import GONE_S, Gone, gone
 from slamreplay.hindsight.reach import proven_reach_m
 from slamreplay.hindsight.regions import Contradictions, changed_regions
@@ -69,6 +76,8 @@ def find_changes(
         appeared_share + removed_share,
         appeared_share,
         removed_share,
+        _to_grid(grid, working, _opened(working, where, removed, passed.bin_count)),
+        freshness_of(working, where, laid, beams.t_ns, passed, new, away, removed),
     )
 
 
@@ -146,6 +155,21 @@ def _went_with_it(
     beside = binary_dilation(removed, np.ones((reach, reach), dtype=bool))
     empty = (pass_bins * BIN_S >= GONE_S) & ~still_seen
     return beside & working.walls & where.fine(empty, working.walls.shape)
+
+
+def _opened(
+    working: WorkingMap,
+    where: Lattice,
+    removed: NDArray[np.bool_],
+    pass_bins: NDArray[np.uint16],
+) -> NDArray[np.bool_]:
+    """(H, W) unmapped cells seen empty that join on to walls that are gone."""
+    passed = where.fine(pass_bins * BIN_S >= GONE_S, working.walls.shape)
+    if not removed.any():
+        return removed
+    near = binary_dilation(removed, np.ones((3, 3), dtype=bool))
+    room = passed & working.unknown
+    return np.asarray(binary_propagation(near & room, mask=room) & room)
 
 
 def _clear(

@@ -23,12 +23,16 @@ class Gone:
     Attributes:
         slots: (H, W) int32 row of each cell in `holds`, -1 of walls that stopped every beam.
         holds: (C, T) the wall was gone in that bin.
+        through: (C, T) beams went through, surely or not.
+        seen: (C, T) something was seen there or near.
         through_s: (C,) for how long beams surely went through.
         seen_s: (C,) for how long something was seen there or near while it was gone.
     """
 
     slots: NDArray[np.int32]
     holds: NDArray[np.bool_]
+    through: NDArray[np.bool_]
+    seen: NDArray[np.bool_]
     through_s: NDArray[np.float64]
     seen_s: NDArray[np.float64]
 
@@ -69,6 +73,8 @@ def gone(where: Lattice, beams: Beams, on_map: BeamsOnMap, ends: NDArray[np.int6
     return Gone(
         slots,
         holds,
+        marks(where, cells, where.bins[scan], slots, 0, len(asked)),
+        seen,
         np.count_nonzero(alone & holds, axis=1) * BIN_S,
         np.count_nonzero(seen & holds, axis=1) * BIN_S,
     )

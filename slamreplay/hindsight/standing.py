@@ -37,12 +37,16 @@ class Standing:
     Attributes:
         slots: (H, W) int32 row of each cell in `holds`, -1 where nothing new was seen.
         holds: (C, T) something stood there in that bin.
+        seen: (C, T) something was seen there.
+        empty: (C, T) beams went through, and nothing was seen there about that time.
         seen_s: (C,) for how long it was seen.
         through_s: (C,) for how long it was seen through while it stood, by noise or else.
     """
 
     slots: NDArray[np.int32]
     holds: NDArray[np.bool_]
+    seen: NDArray[np.bool_]
+    empty: NDArray[np.bool_]
     seen_s: NDArray[np.float64]
     through_s: NDArray[np.float64]
 
@@ -99,7 +103,9 @@ def standing(
     again = _nearest(empty & (bins > last[:, None]), earlier=False)
     course = BIN_S * np.column_stack([until, first, last, again])
     holds = inside & _things(where, slots, seen_s, course)[:, None]
-    return Standing(slots, holds, seen_s, np.count_nonzero(empty & inside, axis=1) * BIN_S)
+    return Standing(
+        slots, holds, seen, empty, seen_s, np.count_nonzero(empty & inside, axis=1) * BIN_S
+    )
 
 
 def _longest_runs(state: NDArray[np.bool_], seen: NDArray[np.bool_]) -> NDArray[np.int64]:

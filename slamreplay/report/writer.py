@@ -8,6 +8,7 @@ from slamreplay.bundle.atomic import atomic_folder
 from slamreplay.report.build import TRAJECTORY_FILE, build
 from slamreplay.report.changed_map import changed_files
 from slamreplay.report.evidence import Postmortem
+from slamreplay.report.freshness_file import FRESHNESS_FILE, freshness_bytes
 from slamreplay.report.html import html
 from slamreplay.report.junit import junit_xml
 from slamreplay.report.trajectory import tum
@@ -16,7 +17,7 @@ MARKER = "report.json"
 
 
 def write_report(post: Postmortem, target: Path) -> Path:
-    """Write report.html, report.json, junit.xml and, with a map, the trajectory and changed cells.
+    """Write report.html, report.json, junit.xml; with a map also trajectory, changes, freshness.
 
     Args:
         post: the post-mortem; the same one gives the same bytes.
@@ -38,6 +39,9 @@ def write_report(post: Postmortem, target: Path) -> Path:
     if post.grid is not None:
         changes = None if post.hindsight is None else post.hindsight.changes
         content |= changed_files(post.grid, changes)
+        if changes is not None and changes.freshness is not None:
+            frame, clock = post.grid.frame_id, post.manifest.clock.name
+            content[FRESHNESS_FILE] = freshness_bytes(changes.freshness, frame=frame, clock=clock)
     with atomic_folder(target, marker=MARKER) as work:
         for name, data in content.items():
             (work / name).write_bytes(data)
