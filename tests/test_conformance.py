@@ -53,6 +53,7 @@ ANGLES = {"angle_min": -1.0, "angle_max": 1.0, "angle_increment": 1.0, "time_inc
 SCAN = {**ANGLES, "scan_time": 0.5, "range_min": 0.1, "range_max": 9.0, "intensities": []}
 IMU = {"orientation": TURN, "angular_velocity": XYZ, "linear_acceleration": XYZ}
 IMU_COV = {f"{name}_covariance": COV9 for name in IMU}
+ERRORS = {"image_error": 0.1, "object_error": 0.1, "fiducial_area": 9.0}
 VELOCITY = {"linear_velocity_xyz": [1, 2, 3], "angular_velocity_xyz": [4, 5, 6]}
 
 #: Message type: the fields of one message, what its first row holds, and its stamp.
@@ -100,6 +101,25 @@ DECODER_LINES = {
     "nav2_msgs/msg/ParticleCloud": (
         {"header": HEADER, "particles": [{"pose": POSE, "weight": 0.5}]},
         {"xyyaw": [1, 2, YAW], "weights": [0.5]},
+        T,
+    ),
+    "fiducial_msgs/msg/FiducialTransformArray": (
+        {
+            "header": HEADER,
+            "image_seq": 1,
+            "transforms": [
+                {"fiducial_id": 7, "transform": {"translation": XYZ, "rotation": TURN}, **ERRORS}
+            ],
+        },
+        {**PLACED, "child_frame_id": "tag_7", "kind": "fiducial"},
+        T,
+    ),
+    "apriltag_ros/msg/AprilTagDetectionArray": (
+        {
+            "header": HEADER,
+            "detections": [{"id": [7], "size": [0.1], "pose": {"header": HEADER, "pose": POSED}}],
+        },
+        {**PLACED, "child_frame_id": "tag_7", "covariance": COV36},
         T,
     ),
     "tf2_msgs/msg/TFMessage": ({"transforms": [TF]}, EDGE, T),

@@ -42,7 +42,7 @@ def test_chosen_edits_contradict_enough_beams_for_long_enough(log, make):
 
 
 def test_unedited_maps_contradict_no_beam(log):
-    box = real_faults.seen_box(log, np.random.Generator(np.random.PCG64(0)))
+    box = next(real_faults.seen_boxes(log, np.random.Generator(np.random.PCG64(0))))
     same = inject.Injection("moved", log.view, START_NS, box, box)
     assert real_faults.edited_beams(same, log).max() == 0.0
 

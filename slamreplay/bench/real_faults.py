@@ -5,7 +5,7 @@ Places are drawn from a seed, among those that enough beams see for long enough 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,6 +23,8 @@ from slamreplay.maps.raycast import cast_rays
 
 Flags = NDArray[np.bool_]
 FAR_M = 0.25
+_PLACES = 4
+_UNSEEN = "no piece of wall is seen by enough beams for long enough"
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,55 +83,69 @@ def wrong_start(log: Recorded, rng: np.random.Generator) -> tuple[str, Injection
 
 def appeared(log: Recorded, rng: np.random.Generator) -> tuple[str, Injection]:
     """A piece of wall that the map does not have."""
-    box = seen_box(log, rng)
-    return f"walls off the map at {_text(box)}", inject.appeared(log.view, box)
+    for box in seen_boxes(log, rng):
+        injection = inject.appeared(log.view, box)
+        if _shows(injection, log):
+            return f"walls off the map at {_text(box)}", injection
+    raise UsageError(_UNSEEN)
 
 
 def removed(log: Recorded, rng: np.random.Generator) -> tuple[str, Injection]:
     """A piece of wall that only the map has."""
-    box = free_box(log, rng)
-    return f"walls drawn at {_text(box)}", inject.removed(log.view, box)
+    for box in free_boxes(log, rng):
+        injection = inject.removed(log.view, box)
+        if _shows(injection, log):
+            return f"walls drawn at {_text(box)}", injection
+    raise UsageError("no free place beside the path is seen by enough beams for long enough")
 
 
 def moved(log: Recorded, rng: np.random.Generator) -> tuple[str, Injection]:
     """A piece of wall that the map has 0.7 m nearer to the path."""
-    box = seen_box(log, rng)
-    centre = np.array([box[0] + box[2], box[1] + box[3]]) / 2
-    near = log.xyyaw[np.nanargmin(np.hypot(*(log.xyyaw[:, :2] - centre).T)), :2]
-    shift = (near - centre) / np.linalg.norm(near - centre) * 0.7
-    what = f"walls of {_text(box)} drawn {shift[0]:+.1f}, {shift[1]:+.1f} m away"
-    return what, inject.moved(log.view, box, shift)
+    for box in seen_boxes(log, rng):
+        centre = np.array([box[0] + box[2], box[1] + box[3]]) / 2
+        near = log.xyyaw[np.nanargmin(np.hypot(*(log.xyyaw[:, :2] - centre).T)), :2]
+        shift = (near - centre) / np.linalg.norm(near - centre) * 0.7
+        injection = inject.moved(log.view, box, shift)
+        if _shows(injection, log):
+            what = f"walls of {_text(box)} drawn {shift[0]:+.1f}, {shift[1]:+.1f} m away"
+            return what, injection
+    raise UsageError(_UNSEEN)
 
 
-def seen_box(log: Recorded, rng: np.random.Generator) -> Box:
-    """A box of walls that many beams end on for some seconds, but not most of what is seen.
+def _shows(injection: Injection, log: Recorded) -> bool:
+    """Whether the fault contradicts clearly more beams than allowed, for some seconds."""
+    seconds = (log.track_ns[-1] - log.track_ns[0]) / NS_PER_S
+    return bool((edited_beams(injection, log) > 0.12).mean() * seconds > 4.0)
 
-    Raises:
-        UsageError: there is none.
-    """
+
+def seen_boxes(log: Recorded, rng: np.random.Generator) -> Iterator[Box]:
+    """Up to a dozen boxes of walls that many beams end on for seconds, but not most of them."""
     rows = np.flatnonzero(np.isfinite(log.xyyaw).all(axis=1))[::4]
     ends = [se2.transform_points(log.xyyaw[k], log.scans.points(int(k))) for k in rows]
     scan = np.repeat(np.arange(len(rows)), [len(e) for e in ends])
     points = np.concatenate(ends)
     beams = np.array([(log.scans.hits[k] | log.scans.misses[k]).sum() for k in rows])
     seconds = (log.track_ns[-1] - log.track_ns[0]) / NS_PER_S
-    starts = points[rng.permutation(len(points))[:400]]
+    starts = points[rng.permutation(len(points))[:200]]
     for side in (1.0, 1.5, 2.2, 3.0):
+        told = 0
         for centre in starts:
             box = (*(centre - side / 2), *(centre + side / 2))
             share = np.bincount(scan[in_box(points, box)], minlength=len(rows)) / beams
             long = (share > 0.14).mean() * seconds
-            if long > 5.0 and np.quantile(share, 0.95) < 0.45:
-                return tuple(float(v) for v in box)  # type: ignore[return-value]
-    raise UsageError("no piece of wall is seen by enough beams for long enough")
+            if long > 5.0 and np.quantile(share, 0.95) < 0.45 and _has_walls(log.grid, box):
+                yield tuple(float(v) for v in box)  # type: ignore[misc]
+                told += 1
+            if told == _PLACES:
+                break
 
 
-def free_box(log: Recorded, rng: np.random.Generator) -> Box:
-    """A box of free cells, away from path and walls, that many beams go through.
+def _has_walls(grid: OccupancyGrid, box: Sequence[float]) -> bool:
+    return bool(in_box(grid.centre_of(np.argwhere(grid.occupied)), box, 0.0).any())
 
-    Raises:
-        UsageError: there is none.
-    """
+
+def free_boxes(log: Recorded, rng: np.random.Generator) -> Iterator[Box]:
+    """A few boxes of free cells, away from path and walls, that many beams go through."""
     from scipy.ndimage import distance_transform_edt
 
     grid = log.grid
@@ -144,6 +160,7 @@ def free_box(log: Recorded, rng: np.random.Generator) -> Box:
     seconds = (log.track_ns[-1] - log.track_ns[0]) / NS_PER_S
     for size in (0.5, 0.8, 1.2, 1.6):
         room = size * 0.75 + 0.3
+        told = 0
         clear = np.argwhere(grid.free & (away > room))
         for cell in clear[rng.permutation(len(clear))[:150]]:
             centre = grid.centre_of(cell)
@@ -157,8 +174,10 @@ def free_box(log: Recorded, rng: np.random.Generator) -> Box:
             drawn = OccupancyGrid(cells, grid.resolution_m, grid.origin_xyyaw)
             nearer = cast_rays(drawn, lasers, bearings, far) < as_mapped - FAR_M
             if (nearer.mean(axis=1) > 0.14).mean() * seconds > 5.0:
-                return tuple(float(v) for v in box)  # type: ignore[return-value]
-    raise UsageError("no free place beside the path is seen by enough beams for long enough")
+                yield tuple(float(v) for v in box)  # type: ignore[misc]
+                told += 1
+            if told == _PLACES:
+                break
 
 
 def edited_beams(injection: Injection, log: Recorded) -> se2.Array:

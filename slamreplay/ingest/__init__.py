@@ -34,6 +34,8 @@ DECODERS = Registry(
         "geometry_msgs/msg/Twist": f"{_HERE}.twist:TWIST",
         "geometry_msgs/msg/TwistStamped": f"{_HERE}.twist:TWIST_STAMPED",
         "nav2_msgs/msg/BehaviorTreeLog": f"{_HERE}.behavior_tree:BEHAVIOR_TREE_LOG",
+        "fiducial_msgs/msg/FiducialTransformArray": f"{_HERE}.fiducials:FIDUCIAL_TRANSFORMS",
+        "apriltag_ros/msg/AprilTagDetectionArray": f"{_HERE}.fiducials:APRILTAG_DETECTIONS",
         "move_base_msgs/msg/RecoveryStatus": f"{_HERE}.recovery_status:RECOVERY_STATUS",
         "diagnostic_msgs/msg/DiagnosticArray": f"{_HERE}.health:DIAGNOSTICS",
         "rcl_interfaces/msg/Log": f"{_HERE}.health:LOG",

@@ -15,6 +15,7 @@ from slamreplay.ingest.leaks import repeated_reference
 from slamreplay.ingest.names import is_map_frame, is_reference, tokens
 from slamreplay.ingest.roles import Choice
 from slamreplay.ingest.rows import TopicRows
+from slamreplay.ingest.sightings import tag_sightings
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,7 +95,7 @@ def settle_cast(topics: Sequence[TopicRows], overrides: Mapping[str, str]) -> Ca
     if "covariance" not in found and pose is not None and roles.has_covariance(pose.rows):
         found["covariance"] = Choice(pose.rows, "the pose's own")
     choices = {role: choice for role, choice in found.items() if choice is not None}
-    return Cast([*others, *tf_rows], choices, frames, losses)
+    return Cast([*others, *tag_sightings(tf_rows), *tf_rows], choices, frames, losses)
 
 
 def _not_given(topics: Sequence[TopicRows], overrides: Mapping[str, str]):  # type: ignore[no-untyped-def]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +13,7 @@ from slamreplay.bundle.view import ROLE_TABLES
 from slamreplay.geometry.times import NO_STAMP
 from slamreplay.ingest.cast import Cast
 from slamreplay.ingest.grids import given_map, map_rows, recorded_maps
-from slamreplay.ingest.names import is_reference
+from slamreplay.ingest.names import is_reference, is_sensed_dock
 from slamreplay.ingest.roles import Choice, is_costmap, is_estimate, is_initial_pose
 from slamreplay.ingest.rows import TopicRows
 from slamreplay.ingest.tables import moved
@@ -81,15 +81,20 @@ def _no_use(
     if topic.table == "points":
         return "another point cloud is used"
     is_belief = is_estimate(topic, cast.frames) or is_initial_pose(topic)
-    if topic.table == "poses" and not is_belief and not is_reference(topic.topic):
+    is_known = is_belief or is_reference(topic.topic) or is_sensed_dock(topic.topic)
+    if topic.table == "poses" and not is_known:
         return "a pose, but not the robot's in a map"
     return None
 
 
 def _in_its_table(topic: TopicRows, cast: Cast, table_of: Mapping[str, str]) -> TopicRows:
     table = table_of.get(topic.topic, topic.table)
-    if topic.table == "transforms":
+    if topic.table in ("transforms", "references"):  # tags on tf share their topic's name with it
         return topic
+    if topic.topic not in table_of and topic.table == "poses" and is_sensed_dock(topic.topic):
+        dock = moved(topic, "references", kind="dock")
+        child = np.full(len(dock), "dock", dtype=object)
+        return replace(dock, columns={**dock.columns, "child_frame_id": child})
     if topic.topic not in table_of and topic.table in ("poses", "odometry"):
         if is_reference(topic.topic):
             table = "references"

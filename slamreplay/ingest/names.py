@@ -49,3 +49,14 @@ _TRUTH = frozenset({"gt", "groundtruth", "truth", "mocap", "vicon", "vrpn", "opt
 def is_reference(topic: str) -> bool:
     """Whether a topic's name claims an independent idea of the truth."""
     return bool(_TRUTH & set(tokens(topic))) or topic.strip("/") == "slamreplay/reference"
+
+
+def is_gnss(topic: str) -> bool:
+    """Whether a topic's name says that a satellite receiver made it: positions without heading."""
+    return bool({"gps", "gnss", "navsat", "rtk"} & set(tokens(topic)))
+
+
+def is_sensed_dock(topic: str) -> bool:
+    """Nav2's `detected_dock_pose`: the dock as the robot sensed it, not where it should be."""
+    words = tokens(basename(topic))
+    return "dock" in words and bool({"detected", "detection"} & set(words))

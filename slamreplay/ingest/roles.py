@@ -8,7 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from slamreplay.bundle.manifest import Frames
-from slamreplay.ingest.names import basename, is_map_frame, is_odom_frame, is_reference, tokens
+from slamreplay.ingest.names import (
+    basename,
+    is_gnss,
+    is_map_frame,
+    is_odom_frame,
+    is_reference,
+    tokens,
+)
 from slamreplay.ingest.rows import TopicRows
 
 #: Where a topic with one of these words stands on the way to a goal, not at the robot.
@@ -53,7 +60,7 @@ def choose_odometry(topics: Sequence[TopicRows], tf: Sequence[TopicRows]) -> Cho
     """Dead reckoning: an Odometry that is neither in a map frame nor a reference."""
     found = [
         t for t in topics if t.table == "odometry" and len(t) and not is_reference(t.topic)
-        and not is_map_frame(t.frame())
+        and not is_map_frame(t.frame()) and not is_gnss(t.topic)
     ]  # fmt: skip
     edges = {
         (p, c) for t in tf for p, c in zip(t.columns["parent_frame"], t.columns["child_frame"],
@@ -190,7 +197,9 @@ def _pick(found: Sequence[TopicRows], rank: Rank, what: str, order: str) -> Choi
 def is_estimate(topic: TopicRows, frames: Frames) -> bool:
     """Whether a topic says where the robot is in a map, for all its type and name tell."""
     words = set(tokens(topic.topic))
-    if is_reference(topic.topic) or words & _NOT_A_BELIEF or is_initial_pose(topic):
+    if is_reference(topic.topic) or is_gnss(topic.topic):
+        return False
+    if words & _NOT_A_BELIEF or is_initial_pose(topic):
         return False
     in_map = topic.frame() == frames.map or is_map_frame(topic.frame())
     if topic.table == "odometry":

@@ -6,7 +6,8 @@ a decoder, so comments and constants are left out. Written in ROS 2 spelling, wh
 understand too (`std_msgs/Header` is whatever the store says it is).
 
 Sources: ros-navigation/navigation2 (nav2_msgs), ros-planning/navigation_msgs (map_msgs,
-move_base_msgs), christianrauch/apriltag_msgs, UbiquityRobotics/fiducials, magazino/move_base_flex.
+move_base_msgs), christianrauch/apriltag_msgs, AprilRobotics/apriltag_ros,
+UbiquityRobotics/fiducials, magazino/move_base_flex.
 """
 
 from __future__ import annotations
@@ -73,6 +74,12 @@ DEFINITIONS: dict[str, str] = {
     ),
     "apriltag_msgs/msg/AprilTagDetectionArray": (
         "std_msgs/Header header\napriltag_msgs/AprilTagDetection[] detections\n"
+    ),
+    "apriltag_ros/msg/AprilTagDetection": (
+        "int32[] id\nfloat64[] size\ngeometry_msgs/PoseWithCovarianceStamped pose\n"
+    ),
+    "apriltag_ros/msg/AprilTagDetectionArray": (
+        "std_msgs/Header header\napriltag_ros/AprilTagDetection[] detections\n"
     ),
     "fiducial_msgs/msg/Fiducial": (
         "int32 fiducial_id\n"

@@ -1,0 +1,82 @@
+"""What the robot sensed of tags and docks is a measurement; a satellite fix needs a datum."""
+
+import numpy as np
+import pytest
+
+from slamreplay.ingest.pipeline import ingest
+from slamreplay.ingest.sightings import is_tag_frame
+
+TF, POSE = "tf2_msgs/msg/TFMessage", "geometry_msgs/msg/PoseStamped"
+FIX, ODOM = "sensor_msgs/msg/NavSatFix", "nav_msgs/msg/Odometry"
+SECOND = 10**9
+
+
+def stamped(logs, kind, step, **values):
+    stamp = {"header__stamp__sec": 1_700_000_000, "header__stamp__nanosec": step * 10**8}
+    return logs.make(kind, **stamp, **values)
+
+
+def edge(logs, step, parent, child, x=0.0):
+    return stamped(
+        logs, "geometry_msgs/msg/TransformStamped", step, header__frame_id=parent,
+        child_frame_id=child, transform__translation__x=x, transform__rotation__w=1.0,
+    )  # fmt: skip
+
+
+@pytest.fixture
+def bundle(logs, tmp_path):
+    """Odometry, tags on tf, a fixed tag, docks, GNSS."""
+    messages = []
+    for step in range(9):
+        t = (1_700_000_000 * SECOND) + step * 10**8
+        seen = [edge(logs, step, "odom", "base_link", 0.1 * step),
+                edge(logs, step, "camera", f"tag_{step % 2}", 1.0 + 0.01 * step),
+                edge(logs, step, "map", "tag_9", 5.0)]  # fmt: skip
+        odometry = {"header__frame_id": "odom", "child_frame_id": "base_link",
+                    "pose__pose__orientation__w": 1.0}  # fmt: skip
+        pose = {"header__frame_id": "camera", "pose__orientation__w": 1.0}
+        messages += [
+            ("/tf", TF, logs.make(TF, transforms=seen), t),
+            ("/odom", ODOM, stamped(logs, ODOM, step, **odometry), t),
+            ("/odometry/gps", ODOM, stamped(logs, ODOM, step, **odometry), t),
+            ("/detected_dock_pose", POSE, stamped(logs, POSE, step, **pose), t),
+            ("/staging_pose", POSE, stamped(logs, POSE, step, **pose), t),
+            ("/fix", FIX, stamped(logs, FIX, step), t),
+        ]
+    return ingest([logs.write("log.mcap", messages)], tmp_path / "b")
+
+
+def test_tags_on_tf_are_sightings_and_stay_on_tf(bundle):
+    rows = bundle.view().table("references")
+    rows = rows.take(rows["kind"] == "fiducial")
+
+    assert sorted(rows["child_frame_id"]) == ["tag_0"] * 5 + ["tag_1"] * 4
+    assert set(rows["frame_id"]) == {"camera"}
+    np.testing.assert_allclose(np.sort(rows["position_xyz"][:, 0]), 1.0 + 0.01 * np.arange(9))
+    assert "tag_0" in set(bundle.table("transforms")["child_frame"])
+
+
+def test_sensed_docks_are_measurements_and_staging_poses_are_not(bundle):
+    rows = bundle.view().table("references")
+    rows = rows.take(rows["kind"] == "dock")
+
+    assert set(rows["topic"]) == {"/detected_dock_pose"}
+    assert set(rows["child_frame_id"]) == {"dock"}
+    assert "/staging_pose" in {x.what for x in bundle.manifest.losses}
+
+
+def test_gnss_is_neither_odometry_nor_belief_and_a_fix_is_counted(bundle):
+    roles = {r.role: r.topic for r in bundle.manifest.roles}
+    assert roles["odometry"] == "/odom"
+    assert "/odometry/gps" not in roles.values()
+    (fix,) = [x for x in bundle.manifest.losses if x.what.startswith("/fix")]
+    assert (fix.count, "no datum" in fix.reason) == (9, True)
+
+
+@pytest.mark.parametrize(
+    ("frame", "is_tag"),
+    [("tag_0", True), ("/tag36h11:12", True), ("robot/fiducial_3", True), ("tag", False),
+     ("stage_0", False), ("camera_tag_mount", False), ("laser_2", False)],
+)  # fmt: skip
+def test_names_of_tag_frames(frame, is_tag):
+    assert is_tag_frame(frame) == is_tag
