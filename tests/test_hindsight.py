@@ -14,7 +14,8 @@ from slamreplay.hindsight.pipeline import hindsight
 from slamreplay.ingest.options import IngestOptions
 from slamreplay.ingest.pipeline import ingest
 from slamreplay.maps.grid import OccupancyGrid
-from slamreplay.testing.synthetic import room_grid, synthetic_bundle, true_path
+from slamreplay.maps.raycast import cast_rays
+from slamreplay.testing.synthetic import MOUNT_XYYAW, room_grid, synthetic_bundle, true_path
 
 
 def errors(found: Hindsight) -> np.ndarray:
@@ -110,6 +111,38 @@ def test_robot_is_found_without_odometry():
 
     assert found is not None
     assert np.quantile(errors(found)[:, 0], 0.95) < 0.1
+
+
+def swept(view: BundleView, sweep_s: float) -> BundleView:
+    """The same scans, taken while the robot drove on from beam to beam."""
+    scans = view.table("scans")
+    t_s = (scans.t_ns - scans.t_ns[0]) / NS_PER_S
+    beam = np.arange(len(scans["ranges_m"][0]))
+    bearing = scans["angle_min_rad"][0] + beam * scans["angle_increment_rad"][0]
+    grid = room_grid()
+    step_s = sweep_s / (len(beam) - 1)
+    ranges = []
+    for t in t_s:
+        rays = se2.compose(true_path(t + beam * step_s), MOUNT_XYYAW)
+        rays[:, 2] += bearing
+        ranges.append(cast_rays(grid, rays, np.zeros(1), 10.0)[:, 0])
+    return view.with_table(
+        scans.replace(
+            ranges_m=Ragged.of(ranges, np.float32),
+            time_increment_s=np.full(len(scans), step_s),
+        )
+    )
+
+
+def test_motion_within_a_sweep_is_taken_out_without_odometry_too():
+    view = swept(synthetic_bundle(seconds=20.0).view(), 0.09)
+    tf = view.table("transforms")
+    view = view.with_table(view.table("odometry").take(np.arange(0)))
+    found = hindsight(view.with_table(tf.take(tf["child_frame"] != "base_link")))
+
+    assert found is not None
+    assert np.median(errors(found)[:, 0]) < 0.026
+    assert np.quantile(errors(found)[:, 1], 0.95) < np.radians(0.6)
 
 
 def test_kidnapped_robot_is_found_on_both_sides():

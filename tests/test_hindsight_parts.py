@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
+from slamreplay.bundle.track import PoseTrack
 from slamreplay.geometry import se2
-from slamreplay.hindsight.beams import HIT, MISS, Beams
+from slamreplay.hindsight.beams import HIT, INVALID, MISS, Beams, interleaved, side_by_side
 from slamreplay.hindsight.changes import find_changes
 from slamreplay.hindsight.keyframes import keyframes
 from slamreplay.hindsight.places import JUMP_DOUBTFUL, JUMP_SOLID, Hypotheses, best_places
@@ -149,3 +150,41 @@ def test_motion_makes_keyframes():
 
     assert keyframes(beams, odometry).tolist() == [0, 3, 6, 9]
     assert keyframes(beams, se2.compose(odometry, np.zeros(3)) * 0.0).tolist() == [0]
+
+
+def laser(t_s: list[float], x: float, ends: list[tuple[float, float]]) -> Beams:
+    """Scans of two hits each, in the base frame, of a laser at (x, 0)."""
+    t_ns = (np.array(t_s) * 1e9).astype(np.int64)
+    same = np.tile(np.array(ends, dtype=np.float32), (len(t_s), 1, 1))
+    return Beams(t_ns, same, np.full(same.shape[:2], HIT, np.int8), np.array([x, 0.0]))
+
+
+def driving() -> PoseTrack:
+    """1 m/s along x."""
+    t_s = np.arange(0.0, 10.0, 0.5)
+    xyyaw = np.column_stack([t_s, 0.0 * t_s, 0.0 * t_s])
+    return PoseTrack.without_covariance("odom", "base", (t_s * 1e9).astype(np.int64), xyyaw)
+
+
+def test_second_laser_lies_beside_the_first_at_its_time():
+    front = laser([1.0, 2.0], 0.2, [(2.0, 0.0), (2.0, 1.0)])
+    rear = laser([1.1, 2.4], -0.2, [(-2.0, 0.0), (-2.0, 1.0)])
+    both = side_by_side(front, rear, driving())
+
+    np.testing.assert_allclose(both.ends[0, 2:], [[-1.9, 0.0], [-1.9, 1.0]], atol=1e-6)
+    assert (both.kind[0] == HIT).all()
+    assert (both.kind[1, 2:] == INVALID).all()  # its nearest scan is 0.4 s away
+
+
+def test_interleaved_rays_start_at_their_own_laser():
+    front = laser([1.0, 2.0], 0.2, [(2.0, 0.0), (2.0, 1.0), (2.0, 2.0)])
+    rear = laser([1.1], -0.2, [(-2.0, 0.0), (-2.0, 1.0)])
+    poses = np.array([[5.0, 1.0, np.pi / 2], [5.0, 2.0, np.pi / 2]])
+    both, both_poses, is_first = interleaved(front, rear, poses, driving())
+
+    assert is_first.tolist() == [True, False, True]
+    start = se2.transform_points(both_poses[1], both.laser_xy[None])[0]
+    ends = se2.transform_points(both_poses[1], both.ends[1, :2])
+    np.testing.assert_allclose(start, [5.0, 1.1 - 0.2], atol=1e-6)
+    np.testing.assert_allclose(ends, [[5.0, -0.9], [4.0, -0.9]], atol=1e-6)
+    assert both.kind[1].tolist() == [HIT, HIT, INVALID]

@@ -67,12 +67,43 @@ class ScanSet:
         return np.asarray(se2.transform_points(motion, ends[:, None, :])[:, 0, :])
 
 
+#: Roles of lasers, the one that estimators and tracks go by first.
+SCAN_ROLES = ("scan", "scan_2")
+
+
 def scan_set(view: BundleView) -> ScanSet | None:
     """The scans of the laser that plays the scan role, or None without one.
 
     A laser whose frame is not in tf is taken to sit at the base's origin; `inspect` says so.
     """
-    table = view.role("scan")
+    return _scans_of(view, "scan", odometry_track(view))
+
+
+def scan_sets(view: BundleView) -> tuple[ScanSet, ...]:
+    """The scans of every laser that has a role: that of `scan_set` first, then the others.
+
+    A second laser alone plays no role; a laser whose place on the robot is not in tf cannot be put
+    together with another and is left out.
+    """
+    odometry, base = odometry_track(view), view.manifest.frames.base
+    first = _scans_of(view, SCAN_ROLES[0], odometry)
+    if first is None:
+        return ()
+    found = [first]
+    for role in SCAN_ROLES[1:]:
+        table = view.role(role)
+        if table is None or not len(table):
+            continue
+        laser = str(table["frame_id"][0])
+        if not base or not (laser == base or view.transforms.has_path(base, laser)):
+            continue
+        more = _scans_of(view, role, odometry)
+        found += [] if more is None else [more]
+    return tuple(found)
+
+
+def _scans_of(view: BundleView, role: str, odometry: PoseTrack | None) -> ScanSet | None:
+    table = view.role(role)
     if table is None or not len(table):
         return None
     table = table.sorted_by_time()
@@ -96,7 +127,7 @@ def scan_set(view: BundleView) -> ScanSet | None:
         np.isposinf(matrix),
         table["range_max_m"],
         mount,
-        odometry_track(view),
+        odometry,
     )
 
 

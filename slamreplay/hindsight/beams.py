@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slamreplay.bundle.scans import ScanSet
+from slamreplay.bundle.track import PoseTrack
 from slamreplay.geometry import se2
 
 INVALID, HIT, MISS = 0, 1, 2
@@ -15,6 +16,8 @@ INVALID, HIT, MISS = 0, 1, 2
 MAX_REACH_M = 30.0
 #: Nearer returns come from the robot itself more often than not.
 MIN_RANGE_M = 0.15
+#: Scans of two lasers further apart than this are not laid side by side.
+PAIRED_NS = 150_000_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,8 +45,13 @@ class Beams:
         return self.ends[scan, self.kind[scan] == HIT].astype(np.float64)
 
 
-def beams_of(scans: ScanSet) -> Beams:
-    """Every beam of a scan set; a scan's own motion, from odometry, is taken out linearly."""
+def beams_of(scans: ScanSet, motion: PoseTrack | None) -> Beams:
+    """Every beam of a scan set; a scan's own motion, as a track has it, is taken out linearly.
+
+    Args:
+        scans: of one laser.
+        motion: the base in a frame that does not jump; None leaves scans as they are.
+    """
     n, width = scans.ranges_m.shape
     kind = np.where(scans.hits, HIT, np.where(scans.misses, MISS, INVALID)).astype(np.int8)
     limit = np.minimum(np.nan_to_num(scans.range_max_m, nan=0.0), MAX_REACH_M)
@@ -57,15 +65,83 @@ def beams_of(scans: ScanSet) -> Beams:
     ends[..., 0] = mount[0] + reach * np.cos(bearing + mount[2])
     ends[..., 1] = mount[1] + reach * np.sin(bearing + mount[2])
     sweep_s = scans.time_increment_s * (width - 1)
-    if scans.odometry is not None and width > 1 and (sweep_s > 0.0).any():
+    if motion is not None and width > 1 and (sweep_s > 0.0).any():
         late_ns = np.where(sweep_s > 0.0, sweep_s * 1e9, 0.0).astype(np.int64)
-        motion = se2.between(
-            scans.odometry.at(scans.t_ns).xyyaw, scans.odometry.at(scans.t_ns + late_ns).xyyaw
-        )
-        motion = np.where(np.isfinite(motion), motion, 0.0)  # beyond the odometry: left as it is
-        part = motion[:, None, :] * (beam / (width - 1))[:, None]
-        cos, sin = np.cos(part[..., 2]), np.sin(part[..., 2])
-        x, y = ends[..., 0].copy(), ends[..., 1].copy()
-        ends[..., 0] = part[..., 0] + cos * x - sin * y
-        ends[..., 1] = part[..., 1] + sin * x + cos * y
+        during = se2.between(motion.at(scans.t_ns).xyyaw, motion.at(scans.t_ns + late_ns).xyyaw)
+        during = np.where(np.isfinite(during), during, 0.0)  # beyond the track: left as it is
+        part = during[:, None, :] * (beam / (width - 1))[:, None]
+        _move(ends, part)
     return Beams(scans.t_ns, ends, kind, mount[:2].copy())
+
+
+def side_by_side(first: Beams, second: Beams, motion: PoseTrack | None) -> Beams:
+    """Each scan of the first laser with the nearest in time of the second, for matching.
+
+    The second's points are brought into the base frame at the first's stamp. Rays still start at
+    the first laser: for what they passed through, use `interleaved`.
+    """
+    after = np.clip(np.searchsorted(second.t_ns, first.t_ns), 1, max(len(second) - 1, 1))
+    after = np.minimum(after, len(second) - 1)
+    before = np.maximum(after - 1, 0)
+    apart = np.abs(second.t_ns[[before, after]] - first.t_ns)
+    nearest = np.where(apart[0] <= apart[1], before, after)
+    ends, kind = second.ends[nearest].copy(), second.kind[nearest].copy()
+    kind[apart.min(axis=0) > PAIRED_NS] = INVALID
+    if motion is not None:
+        moved = se2.between(motion.at(first.t_ns).xyyaw, motion.at(second.t_ns[nearest]).xyyaw)
+        _move(ends, np.where(np.isfinite(moved), moved, 0.0)[:, None, :])
+    return Beams(
+        first.t_ns,
+        np.concatenate([first.ends, ends], axis=1),
+        np.concatenate([first.kind, kind], axis=1),
+        first.laser_xy,
+    )
+
+
+def interleaved(
+    first: Beams, second: Beams, poses: se2.Array, motion: PoseTrack | None
+) -> tuple[Beams, se2.Array, NDArray[np.bool_]]:
+    """The scans of both lasers in time order, their poses, and which are the first's.
+
+    All rays shall start at one point of the robot, so the second laser's scans get a base of their
+    own, shifted so that its laser lies where the first's does. They follow `motion` from the
+    nearest scan of the first that has a pose; without that the scan's own pose holds.
+
+    Args:
+        first: N scans.
+        second: M scans.
+        poses: (N, 3) of the first's, NaN where there is none.
+        motion: the base in a frame that does not jump.
+    """
+    after = np.clip(np.searchsorted(first.t_ns, second.t_ns), 0, len(first) - 1)
+    before = np.maximum(after - 1, 0)
+    apart = np.abs(first.t_ns[[before, after]] - second.t_ns)
+    nearest = np.where(apart[0] <= apart[1], before, after)
+    way = np.zeros((len(second), 3))
+    if motion is not None:
+        way = se2.between(motion.at(first.t_ns[nearest]).xyyaw, motion.at(second.t_ns).xyyaw)
+        way = np.where(np.isfinite(way), way, 0.0)
+    shift = second.laser_xy - first.laser_xy
+    theirs = se2.compose(poses[nearest], se2.compose(way, np.append(shift, 0.0)))
+    theirs[apart.min(axis=0) > PAIRED_NS] = np.nan
+    width = max(first.kind.shape[1], second.kind.shape[1])
+    ends = np.concatenate([_wide(first.ends, width), _wide(second.ends - shift, width)])
+    kind = np.concatenate([_wide(first.kind, width), _wide(second.kind, width)])
+    t_ns = np.concatenate([first.t_ns, second.t_ns])
+    order = np.argsort(t_ns, kind="stable")
+    both = Beams(t_ns[order], ends[order].astype(np.float32), kind[order], first.laser_xy)
+    return both, np.concatenate([poses, theirs])[order], order < len(first)
+
+
+def _wide(values: NDArray, width: int) -> NDArray:
+    """Padded with zeros (INVALID) to `width` beams."""
+    rest = [(0, 0)] * (values.ndim - 2)
+    return np.pad(values, [(0, 0), (0, width - values.shape[1]), *rest])
+
+
+def _move(ends: NDArray[np.float32], motion: se2.Array) -> None:
+    """Bring ends (N, B, 2) seen after motions (N, 1 or B, 3) into the frame before them."""
+    cos, sin = np.cos(motion[..., 2]), np.sin(motion[..., 2])
+    x, y = ends[..., 0].copy(), ends[..., 1].copy()
+    ends[..., 0] = motion[..., 0] + cos * x - sin * y
+    ends[..., 1] = motion[..., 1] + sin * x + cos * y

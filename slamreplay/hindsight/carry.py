@@ -14,7 +14,9 @@ from slamreplay.matching.correlative import Window, match
 from slamreplay.matching.field import ScoreField
 from slamreplay.matching.thinning import thin
 
-WINDOW = Window(0.1, 0.05, 0.09, 0.015, pull=0.05)
+WINDOW = Window(0.1, 0.1, 0.09, 0.03, pull=0.05)
+#: The same where odometry missed much of the way (slip, a robot that is carried).
+WIDE = Window(0.4, 0.1, 0.36, 0.04, pull=0.05)
 
 
 def carry(
@@ -24,8 +26,10 @@ def carry(
     is_open: NDArray[np.bool_],
     beams: Beams,
     field: ScoreField,
-) -> tuple[se2.Array, NDArray[np.int64]]:
-    """Poses (N, 3) of all scans, and the keyframe (N,) whose covariance and trust each shares.
+) -> tuple[se2.Array, NDArray[np.int64], se2.Array]:
+    """Poses (N, 3) of all scans, the keyframe (N,) each shares its trust with, and its doubt.
+
+    The doubt (N, 3) is how far off in x, y and yaw the pose may be for what odometry missed.
 
     Between two keyframes the scans follow odometry; what it misses on the way is spread evenly over
     the time. Over an open link (kidnapped, chain broken) each scan goes to the side it fits.
@@ -58,7 +62,10 @@ def carry(
         carried[over] = np.where(later[:, None], back, ahead)[over]
         share[over] = np.where(later, after, before)[over]
     carried[keys], share[keys] = poses, np.arange(len(keys))
-    return carried, share
+    doubt = np.minimum(part, 1.0 - part) * np.abs(missing)
+    doubt[:, :2] = np.hypot(doubt[:, 0], doubt[:, 1])[:, None]
+    doubt[over] = 0.0
+    return carried, share, doubt
 
 
 def settle(
@@ -66,6 +73,7 @@ def settle(
     cov: se2.Array,
     odometry: se2.Array,
     near: NDArray[np.int64],
+    doubt: se2.Array,
     beams: Beams,
     field: ScoreField,
 ) -> tuple[se2.Array, se2.Array]:
@@ -79,12 +87,15 @@ def settle(
         cov: (N, 3, 3) covariances of the keyframes they were carried from.
         odometry: (N, 3) odometry at the scans.
         near: (N,) the scan that is the keyframe of each.
+        doubt: (N, 3) how far off the carried pose may be, as `carry` has it.
         beams: the scans.
         field: score field of the map.
     """
     way = se2.between(odometry[near], odometry)
     sigma_m = 0.02 + 0.1 * np.hypot(way[:, 0], way[:, 1]) + 0.03 * np.abs(way[:, 2])
     sigma = np.stack([sigma_m, sigma_m, 0.005 + 0.4 * np.abs(way[:, 2])], axis=1)
+    sigma = np.hypot(sigma, doubt)
+    is_wide = np.any(doubt > np.array([0.08, 0.08, 0.06]), axis=1).tolist()
     poses, spread = carried.copy(), cov.copy()
     moved = np.flatnonzero(np.isfinite(carried).all(axis=1) & (near != np.arange(len(near))))
     for k in moved.tolist():
@@ -93,9 +104,11 @@ def settle(
         points = thin(beams.points(k), 0.1)
         if len(points) < MIN_POINTS:
             continue
-        top = match(field, points, carried[k], WINDOW)
+        window = WIDE if is_wide[k] else WINDOW
+        top = match(field, points, carried[k], window)
         off = top.xyyaw - carried[k]
-        if top.score < MIN_SCORE or np.hypot(off[0], off[1]) > 0.3 or abs(off[2]) > 0.15:
+        too_far = np.hypot(off[0], off[1]) > window.reach_m + 0.2
+        if top.score < MIN_SCORE or too_far or abs(off[2]) > window.reach_rad + 0.06:
             continue
         measured = match_covariance(top.information[None], np.array([top.score]))[0]
         gain = prior @ np.linalg.inv(prior + measured)

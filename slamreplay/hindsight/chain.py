@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slamreplay.geometry import se2
-from slamreplay.matching.correlative import Match, Window, climb, match, search_window
+from slamreplay.matching.correlative import Match, Window, match, search_window
 from slamreplay.matching.field import ScoreField, points_field
 from slamreplay.matching.thinning import thin
 
@@ -22,7 +22,8 @@ GOOD, POOR = 0.6, 0.35
 GAIN = 0.08
 #: Within this scan and odometry agree on the motion between two keyframes.
 AGREE_M, AGREE_RAD = 0.15, 0.2
-NARROW = Window(0.3, 0.05, np.radians(12.0), np.radians(1.5), pull=0.03)
+NARROW = Window(0.3, 0.1, np.radians(12.0), np.radians(2.0), pull=0.03)
+CLOSE = Window(0.05, 0.05, np.radians(1.0), np.radians(1.0), pull=0.0)
 WIDE = Window(1.2, 0.1, np.radians(20.0), np.radians(2.0), pull=0.03)
 AROUND = Window(0.6, 0.1, np.pi, np.radians(3.0), pull=0.03)
 
@@ -96,8 +97,8 @@ def _lay(
     field = _local_map(memory, xyyaw, last)
     if field is None or not len(scan):
         return Match(guess, 0.0, np.zeros((3, 3)))
-    start, _ = search_window(field, scan, guess, NARROW)
-    best = climb(field, scan, start)
+    start, _ = search_window(field, scan[::2], guess, NARROW)
+    best = match(field, scan, start, CLOSE)
     at_edge = np.abs(start - guess)[:2].max() > NARROW.reach_m - 1e-6
     if best.score < GOOD or at_edge:
         for centre, window in ((guess, WIDE), (last, AROUND)):

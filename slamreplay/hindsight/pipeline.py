@@ -6,17 +6,18 @@ It reads neither the recorded belief nor an initial pose: a robot that was lost 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from slamreplay.bundle.products import Hindsight
-from slamreplay.bundle.scans import ScanSet, scan_set
+from slamreplay.bundle.products import Changes, Hindsight
+from slamreplay.bundle.scans import scan_sets
 from slamreplay.bundle.track import PoseTrack
 from slamreplay.bundle.view import BundleView
 from slamreplay.geometry import se2
 from slamreplay.geometry.covariance import planar_from_gtsam
-from slamreplay.hindsight.beams import Beams, beams_of
+from slamreplay.hindsight.beams import Beams, beams_of, interleaved, side_by_side
 from slamreplay.hindsight.carry import carry, scan_scores, settle
 from slamreplay.hindsight.chain import Chain, scan_matched
 from slamreplay.hindsight.changes import find_changes
@@ -32,6 +33,7 @@ from slamreplay.hindsight.seating import seat_keyframes
 from slamreplay.hindsight.smoothing import smooth
 from slamreplay.hindsight.submaps import Submap, submaps
 from slamreplay.hindsight.trust import trusted_keyframes
+from slamreplay.maps.grid import OccupancyGrid
 from slamreplay.matching.field import WorkingMap, working_map
 from slamreplay.matching.whole_map import search_space
 
@@ -51,15 +53,19 @@ def hindsight(view: BundleView, *, progress: Progress | None = None) -> Hindsigh
         None without a map (or one without a single wall) or without scans.
     """
     say = progress or (lambda _step, _share: None)
-    scans = scan_set(view)
+    lasers = scan_sets(view)
     grid = view.grid
     working = None if grid is None else working_map(grid)
-    if scans is None or grid is None or working is None:
+    if not lasers or grid is None or working is None:
         return None
-    beams = beams_of(scans)
     base = view.manifest.frames.base or "base_link"
     say("keyframes", 0.0)
-    odometry = odometry_at(scans, beams)
+    motion = lasers[0].odometry
+    if motion is None or not motion.has_pose.any():
+        motion = motion_by_scans(base, _beside([beams_of(laser, None) for laser in lasers], None))
+    each = [beams_of(laser, motion) for laser in lasers]
+    beams = _beside(each, motion)
+    odometry = odometry_at(motion, beams.t_ns)
     keys = keyframes(beams, odometry)
     if not len(keys):
         return _nowhere(grid.frame_id, base, beams)
@@ -72,27 +78,29 @@ def hindsight(view: BundleView, *, progress: Progress | None = None) -> Hindsigh
     field = working.field(SIGMA_M)
     space = search_space(working, field)
     motions, is_break = _between_submaps(chain, found)
+    jump_costs = _jump_costs(chain, found)
     hypotheses = hypotheses_of(
         space,
         working,
         found,
         motions,
         is_break,
+        jump_costs == JUMP_SOLID,
         lambda share: say("places on the map", 0.3 + 0.4 * share),
     )
-    places = best_places(hypotheses, motions, _jump_costs(chain, found))
+    places = best_places(hypotheses, motions, jump_costs)
     start, is_open = seat_keyframes(field, points, chain, found, places)
     say("pose graph", 0.7)
     poses, cov = smooth(field, points, start, chain, is_open)
     say("every scan", 0.8)
     key_beams = Beams(beams.t_ns[keys], beams.ends[keys], beams.kind[keys], beams.laser_xy)
     trusted = trusted_keyframes(places, chain, is_open, cov, scan_scores(field, key_beams, poses))
-    carried, share = carry(odometry, keys, poses, is_open, beams, field)
-    carried, scan_cov = settle(carried, cov[share], odometry, keys[share], beams, field)
+    carried, share, doubt = carry(odometry, keys, poses, is_open, beams, field)
+    carried, scan_cov = settle(carried, cov[share], odometry, keys[share], doubt, beams, field)
     carried[~trusted[share]], scan_cov[~trusted[share]] = np.nan, np.nan
     match = scan_scores(field, beams, carried)
     say("changes", 0.85)
-    changes = find_changes(grid, working, beams, carried)
+    changes = _changes(grid, working, each, carried, motion)
     say("changes", 1.0)
     track = _to_track(working, grid.frame_id, base, beams.t_ns, carried, scan_cov)
     sigma = np.sqrt(0.5 * (scan_cov[:, 0, 0] + scan_cov[:, 1, 1]))
@@ -107,20 +115,49 @@ def hindsight(view: BundleView, *, progress: Progress | None = None) -> Hindsigh
     )
 
 
-def odometry_at(scans: ScanSet, beams: Beams) -> se2.Array:
-    """(N, 3) odometry at each scan; where the log has none, by matching scan to scan.
+def odometry_at(motion: PoseTrack, t_ns: NDArray[np.int64]) -> se2.Array:
+    """(N, 3) odometry at times (N,).
 
-    Before the first odometry sample, after the last and in gaps the robot is taken to stand; the
-    keyframes' own scan matching finds out where it did not.
+    Before the first sample, after the last and in gaps the robot is taken to stand; the keyframes'
+    own scan matching finds out where it did not.
     """
-    track = scans.odometry
-    if track is not None and track.has_pose.any():
-        poses = track.at(scans.t_ns, max_gap_ns=10_000_000_000).xyyaw.copy()
-        known = np.flatnonzero(np.isfinite(poses).all(axis=1))
-        if len(known):
-            before = np.searchsorted(known, np.arange(len(poses)), side="right") - 1
-            return np.asarray(poses[known[np.maximum(before, 0)]])
-    return scan_matched([beams.points(k) for k in range(len(beams))], None).xyyaw
+    poses = motion.at(t_ns, max_gap_ns=10_000_000_000).xyyaw.copy()
+    known = np.flatnonzero(np.isfinite(poses).all(axis=1))
+    if not len(known):
+        return np.zeros((len(t_ns), 3))
+    before = np.searchsorted(known, np.arange(len(poses)), side="right") - 1
+    return np.asarray(poses[known[np.maximum(before, 0)]])
+
+
+def motion_by_scans(base: str, beams: Beams) -> PoseTrack:
+    """What stands in for odometry where a log has none: each scan matched to those before it."""
+    xyyaw = scan_matched([beams.points(k) for k in range(len(beams))], None).xyyaw
+    return PoseTrack.without_covariance("odom", base, beams.t_ns, xyyaw)
+
+
+def _beside(each: list[Beams], motion: PoseTrack | None) -> Beams:
+    return each[0] if len(each) == 1 else side_by_side(each[0], each[1], motion)
+
+
+def _changes(
+    grid: OccupancyGrid,
+    working: WorkingMap,
+    each: list[Beams],
+    poses: se2.Array,
+    motion: PoseTrack,
+) -> Changes:
+    """Changes seen by all lasers; the shares are those of the first one's scans."""
+    if len(each) == 1:
+        return find_changes(grid, working, each[0], poses)
+    both, both_poses, is_first = interleaved(each[0], each[1], poses, motion)
+    found = find_changes(grid, working, both, both_poses)
+    return replace(
+        found,
+        t_ns=found.t_ns[is_first],
+        changed_share=found.changed_share[is_first],
+        appeared_share=found.appeared_share[is_first],
+        removed_share=found.removed_share[is_first],
+    )
 
 
 def _between_submaps(chain: Chain, found: list[Submap]) -> tuple[se2.Array, NDArray[np.bool_]]:

@@ -15,6 +15,9 @@ from slamreplay.matching.field import WorkingMap
 from slamreplay.matching.whole_map import SearchSpace, distinct, search_map
 
 COUNT, PASSED_ON = 40, 6
+#: Where the motion is beyond doubt, every so manieth submap is searched for on the whole map; those
+#: between take over the places of both, carried by that motion: this many.
+SEARCH_STRIDE, CARRIED_ON = 4, 16
 #: Each mapped wall that a ray crosses speaks against a place, but softly: it may be gone.
 BLOCKED_WEIGHT, BLOCKED_FREE = 0.2, 0.05
 _NEAR = Window(0.3, 0.1, np.radians(4.0), np.radians(2.0), pull=0.02)
@@ -26,6 +29,7 @@ def hypotheses_of(
     found: Sequence[Submap],
     motions: se2.Array,
     is_break: NDArray[np.bool_],
+    is_solid: NDArray[np.bool_],
     say: Callable[[float], None],
 ) -> list[Hypotheses]:
     """Hypotheses of every submap, best first.
@@ -39,22 +43,38 @@ def hypotheses_of(
         found: the S submaps.
         motions: (S - 1, 3) from each reference to the next.
         is_break: (S - 1,) motions that are not known.
+        is_solid: (S - 1,) motions that are beyond doubt.
         say: told the share done.
     """
+    searched = _searched(is_solid)
     lists = []
     for i, submap in enumerate(found):
-        poses, scores = search_map(space, submap.points, count=COUNT)
+        poses, scores = np.empty((0, 3)), np.empty(0)
+        if searched[i]:
+            poses, scores = search_map(space, submap.points, count=COUNT)
         lists.append(_scored(working, submap, poses, scores))
         say((i + 1) / len(found))
-    for s, broken in enumerate(is_break):
-        if not broken:
-            onward = se2.compose(lists[s].xyyaw[:PASSED_ON], motions[s])
-            lists[s + 1] = _joined(space, working, found[s + 1], lists[s + 1], onward)
-    for s in range(len(is_break) - 1, -1, -1):
-        if not is_break[s]:
-            back = se2.compose(lists[s + 1].xyyaw[:PASSED_ON], se2.inverse(motions[s]))
-            lists[s] = _joined(space, working, found[s], lists[s], back)
+    for s in np.flatnonzero(~is_break).tolist():
+        many = PASSED_ON if searched[s + 1] else CARRIED_ON
+        onward = se2.compose(lists[s].xyyaw[:many], motions[s])
+        is_sure = bool(is_solid[s] and not searched[s + 1])
+        lists[s + 1] = _joined(space, working, found[s + 1], lists[s + 1], onward, is_sure=is_sure)
+    for s in np.flatnonzero(~is_break)[::-1].tolist():
+        many = PASSED_ON if searched[s] else CARRIED_ON
+        back = se2.compose(lists[s + 1].xyyaw[:many], se2.inverse(motions[s]))
+        is_sure = bool(is_solid[s] and not searched[s])
+        lists[s] = _joined(space, working, found[s], lists[s], back, is_sure=is_sure)
     return lists
+
+
+def _searched(is_solid: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """(S,) submaps to search for: both ends of each solid stretch and some within it."""
+    out = np.zeros(len(is_solid) + 1, dtype=bool)
+    starts = np.append(0, np.flatnonzero(~is_solid) + 1)
+    for first, last in zip(starts, np.append(starts[1:], len(out)) - 1, strict=True):
+        out[first : last + 1 : SEARCH_STRIDE] = True
+        out[last] = True
+    return out
 
 
 def _scored(working: WorkingMap, submap: Submap, poses: se2.Array, scores: se2.Array) -> Hypotheses:
@@ -65,11 +85,18 @@ def _scored(working: WorkingMap, submap: Submap, poses: se2.Array, scores: se2.A
 
 
 def _joined(
-    space: SearchSpace, working: WorkingMap, submap: Submap, known: Hypotheses, new: se2.Array
+    space: SearchSpace,
+    working: WorkingMap,
+    submap: Submap,
+    known: Hypotheses,
+    new: se2.Array,
+    *,
+    is_sure: bool,
 ) -> Hypotheses:
-    tops = [match(space.fine, submap.points, pose, _NEAR) for pose in new]
-    # As expected and unmoved too: where nothing of the map is left, a climb leads astray.
-    stays = [climb(space.fine, submap.points, pose) for pose in new[:1]]
+    """The known places and those that a neighbour's lead to; sure motion needs no window."""
+    tops = [] if is_sure else [match(space.fine, submap.points, pose, _NEAR) for pose in new]
+    # As expected and unmoved too: where nothing of the map is left, a window leads astray.
+    stays = [climb(space.fine, submap.points, pose) for pose in (new if is_sure else new[:1])]
     poses = np.array([m.xyyaw for m in (*tops, *stays)])
     fresh = _scored(working, submap, poses, np.array([m.score for m in (*tops, *stays)]))
     poses = np.concatenate([known.xyyaw, fresh.xyyaw])

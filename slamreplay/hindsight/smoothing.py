@@ -16,8 +16,8 @@ from slamreplay.matching.field import ScoreField
 from slamreplay.matching.thinning import thin
 
 WINDOWS = (
-    Window(0.3, 0.05, np.radians(5.0), np.radians(1.0), pull=0.05),
-    Window(0.1, 0.05, np.radians(1.5), np.radians(0.75), pull=0.02),
+    Window(0.3, 0.1, np.radians(5.0), np.radians(1.7), pull=0.05),
+    Window(0.1, 0.1, np.radians(1.5), np.radians(1.5), pull=0.02),
 )
 #: A keyframe whose scan fits the map worse is held by its neighbours only.
 MIN_SCORE = 0.3
