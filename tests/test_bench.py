@@ -8,6 +8,7 @@ import pytest
 from typer.testing import CliRunner
 
 from slamreplay.bench import runner
+from slamreplay.bench.baselines import misalignment
 from slamreplay.bench.conditions import CONDITIONS
 from slamreplay.bench.incidents import KINDS
 from slamreplay.bench.measure import Measured, measured
@@ -42,6 +43,7 @@ def made_up(
         "covariance": np.full(N, 0.1),
         "mean_absolute_error": np.where(lost, 0.5, 0.1),
         "beams_off": np.full(N, np.nan),
+        "misalignment_mrf": np.full(N, 0.2),
         **moments,
     }
     facts = {
@@ -221,3 +223,11 @@ def test_command_prints_the_tables(tmp_path, monkeypatch):
     assert "| lost, F1 per moment |" in result.stdout
     assert ">= 0.995" in result.stdout
     assert json.loads((target / "results.json").read_text())["scores"]["logs"] == 30
+
+
+def test_residuals_of_a_wrong_pose_are_called_misaligned():
+    rng = np.random.Generator(np.random.PCG64(0))
+    right, wrong = np.abs(rng.normal(0.0, 0.03, 200)), rng.exponential(0.35, 200)
+
+    assert misalignment(right) < 0.5
+    assert misalignment(wrong[wrong < 1.0]) > 1.0

@@ -107,13 +107,13 @@ def on_sensing(kind: str, story: Scenario, motion: Motion, rng: np.random.Genera
         return replace(story, no_scans=bursts)
     if kind == "overconfident":
         sign = np.where(rng.random(3) < 0.5, -1.0, 1.0)
-        scale, turn_scale, pull = sign * rng.uniform((0.02, 0.03, 0.006), (0.05, 0.07, 0.02))
-        noise = 0.2 / 4.0  # alphas are variances: half the standard deviation
-        few = int(rng.integers(80, 200))
-        amcl = AmclConfig(
-            noise, noise, noise, noise, max_beams=15, min_particles=few, max_particles=few
-        )
-        wheels = WheelErrors(float(scale), float(turn_scale), float(pull), 0.04, 0.06)
+        # A worn, unequal pair of wheels, and a filter told of half the noise that wheels have new:
+        # its cloud never reaches the place that odometry misses.
+        scale, turn_scale, pull = sign * rng.uniform((0.03, 0.04, 0.012), (0.07, 0.1, 0.03))
+        told = 0.5 * 0.02
+        few = int(rng.integers(40, 100))
+        amcl = AmclConfig(*(4 * [told**2]), max_beams=15, min_particles=few, max_particles=few)
+        wheels = WheelErrors(float(scale), float(turn_scale), float(pull), 0.03, 0.04)
         return replace(story, amcl=amcl, wheels=wheels)
     if kind == "map_frame":
         turn = float(rng.uniform(-0.5, 0.5)) if rng.random() < 0.5 else 0.0
