@@ -110,9 +110,11 @@ def on_sensing(kind: str, story: Scenario, motion: Motion, rng: np.random.Genera
         # A worn, unequal pair of wheels, and a filter told of half the noise that wheels have new:
         # its cloud never reaches the place that odometry misses.
         scale, turn_scale, pull = sign * rng.uniform((0.03, 0.04, 0.012), (0.07, 0.1, 0.03))
-        told = 0.5 * 0.02
+        told = (0.5 * 0.02) ** 2
         few = int(rng.integers(40, 100))
-        amcl = AmclConfig(*(4 * [told**2]), max_beams=15, min_particles=few, max_particles=few)
+        amcl = AmclConfig(
+            told, told, told, told, max_beams=15, min_particles=few, max_particles=few
+        )
         wheels = WheelErrors(float(scale), float(turn_scale), float(pull), 0.03, 0.04)
         return replace(story, amcl=amcl, wheels=wheels)
     if kind == "map_frame":
