@@ -7,7 +7,7 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import binary_dilation, label
+from scipy.ndimage import binary_dilation, find_objects, label
 from scipy.spatial import cKDTree
 
 from slamreplay.bundle.products import ChangedRegion
@@ -21,6 +21,11 @@ JOIN_M, MIN_VIEWS = 0.3, 5
 ALIKE_SHARE, ALIKE_M, COVERED_SHARE = 0.9, 0.12, 0.35
 #: Their lengths differ by no more than this, m; smaller things look all alike.
 LENGTH_M, SMALLEST_M = 0.3, 0.3
+#: Within this distance one end of a thing, seen for this share of its length, or a single face of
+#: it, is enough to know it again; beyond the other distance nothing is.
+NEAR_M, SEEN_SHARE, FAR_M = 3.0, 0.6, 10.0
+#: The mapped thing that a removed patch is part of: no larger, and the patch is so much of it.
+THING_M, PATCH_SHARE = 10.0, 0.15
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,6 +53,7 @@ class Contradictions:
 class _Patch:
     region: ChangedRegion
     cells_m: se2.Array  # (K, 2) centres of its cells in the grid's frame
+    cells: NDArray[np.int64]  # (K, 2) row and column
 
 
 def changed_regions(
@@ -61,8 +67,12 @@ def changed_regions(
         removed: beams that go through mapped walls, and those walls.
     """
     new, old = _patches(working, appeared), _patches(working, removed)
-    pairs = _pairs(new, old)
-    regions = [_moved(new[i].region, old[j].region, alike) for i, j, alike in pairs]
+    things = _things(working, old)
+    pairs = _pairs([p.cells_m for p in new], things)
+    regions = [
+        _moved(new[i].region, old[j].region, _bbox_m(working, things[j]), alike)
+        for i, j, alike in pairs
+    ]
     regions += [p.region for i, p in enumerate(new) if i not in {pair[0] for pair in pairs}]
     regions += [p.region for j, p in enumerate(old) if j not in {pair[1] for pair in pairs}]
     return tuple(sorted(regions, key=lambda r: (-r.area_m2, r.bbox_m, r.kind)))
@@ -81,28 +91,45 @@ def _patches(working: WorkingMap, found: Contradictions) -> list[_Patch]:
         if len(scans) < MIN_VIEWS:
             continue
         own = cells[of_cell == number]
-        low = working.corner_xy + own.min(axis=0)[::-1] * working.resolution_m
-        high = working.corner_xy + (own.max(axis=0)[::-1] + 1) * working.resolution_m
-        box = np.array([[low[0], low[1]], [high[0], low[1]], [low[0], high[1]], [high[0], high[1]]])
-        box = se2.transform_points(working.origin_xyyaw, box)
+        centres = working.corner_xy + (own[:, ::-1] + 0.5) * working.resolution_m
         clear = float(found.clear[tuple(own.T)].mean())
         region = ChangedRegion(
             found.kind,
-            (*box.min(axis=0).tolist(), *box.max(axis=0).tolist()),
+            _bbox_m(working, centres),
             len(own) * working.resolution_m**2,
             int(found.t_ns[scans[0]]),
             int(found.t_ns[scans[-1]]),
             len(scans),
             clear * float(1.0 - np.exp(-len(scans) / 10.0)),
         )
-        centres = working.corner_xy + (own[:, ::-1] + 0.5) * working.resolution_m
-        patches.append(_Patch(region, centres))
+        patches.append(_Patch(region, centres, own))
     return patches
 
 
-def _pairs(new: list[_Patch], old: list[_Patch]) -> list[tuple[int, int, float]]:
-    """Index in `new`, index in `old` and likeness of what moved, each patch at most once."""
-    likeness = np.array([[_alike(a.cells_m, b.cells_m) for b in old] for a in new])
+def _things(working: WorkingMap, old: list[_Patch]) -> list[se2.Array]:
+    """(K, 2) the mapped outline of what each removed patch was part of, or else the patch itself.
+
+    What moved by less than its own size covers part of its old place, which then is not removed.
+    """
+    labels, _ = label(working.walls, np.ones((3, 3)))
+    boxes = find_objects(labels)
+    things = []
+    for patch in old:
+        number = int(np.argmax(np.bincount(labels[tuple(patch.cells.T)])))
+        thing = patch.cells_m
+        if number:
+            box = boxes[number - 1]
+            size_m = max(s.stop - s.start for s in box) * working.resolution_m
+            cells = np.argwhere(labels[box] == number) + [s.start for s in box]
+            if size_m <= THING_M and len(patch.cells) >= PATCH_SHARE * len(cells):
+                thing = working.corner_xy + (cells[:, ::-1] + 0.5) * working.resolution_m
+        things.append(thing)
+    return things
+
+
+def _pairs(new: list[se2.Array], old: list[se2.Array]) -> list[tuple[int, int, float]]:
+    """Index in `new`, index in `old` and likeness of what moved, each at most once."""
+    likeness = np.array([[_alike(a, b) for b in old] for a in new])
     pairs: list[tuple[int, int, float]] = []
     while likeness.size and likeness.max() > 0.0:
         i, j = np.unravel_index(np.argmax(likeness), likeness.shape)
@@ -117,14 +144,23 @@ def _alike(new: se2.Array, old: se2.Array) -> float:
     What was removed is seen on all sides, for beams go through it; of what appeared often only one
     side is. So the new outline is laid over the old one, corner on corner, in all four headings.
     """
+    way = float(np.hypot(*(_middle(new) - _middle(old))))
+    if way > FAR_M:
+        return 0.0
     new_box, old_box = _upright(new), _upright(old)
     new_size, old_size = np.sort(new_box.max(axis=0)), np.sort(old_box.max(axis=0))
-    if new_size[1] < SMALLEST_M or abs(new_size[1] - old_size[1]) > LENGTH_M:
+    least = old_size[1] - LENGTH_M
+    if way <= NEAR_M:
+        least = min(least, SEEN_SHARE * old_size[1])
+    elif new_size[0] < SMALLEST_M:
+        return 0.0
+    if not max(SMALLEST_M, least) <= new_size[1] <= old_size[1] + LENGTH_M:
         return 0.0
     if new_size[0] > old_size[0] + LENGTH_M:
         return 0.0
     outline, best = cKDTree(old_box), 0.0
     size = old_box.max(axis=0)
+    least_covered = COVERED_SHARE if way > NEAR_M else SEEN_SHARE * COVERED_SHARE
     for quarter in range(4):
         turned = se2.transform_points(np.array([0.0, 0.0, quarter * np.pi / 2.0]), new_box)
         turned = turned - turned.min(axis=0)
@@ -133,9 +169,13 @@ def _alike(new: se2.Array, old: se2.Array) -> float:
             laid = turned + corner * slack
             on_it = float(np.mean(outline.query(laid)[0] <= ALIKE_M))
             covered = float(np.mean(cKDTree(laid).query(old_box)[0] <= ALIKE_M))
-            if on_it >= ALIKE_SHARE and covered >= COVERED_SHARE:
+            if on_it >= ALIKE_SHARE and covered >= least_covered:
                 best = max(best, on_it * (0.5 + 0.5 * covered))
-    return best
+    return best / (1.0 + way / FAR_M)  # of two like ones the nearer
+
+
+def _middle(points: se2.Array) -> se2.Array:
+    return np.asarray(0.5 * (points.min(axis=0) + points.max(axis=0)))
 
 
 def _upright(points: se2.Array) -> se2.Array:
@@ -149,11 +189,26 @@ def _upright(points: se2.Array) -> se2.Array:
     return np.asarray(best - best.min(axis=0))
 
 
-def _moved(new: ChangedRegion, old: ChangedRegion, alike: float) -> ChangedRegion:
+def _bbox_m(working: WorkingMap, centres: se2.Array) -> tuple[float, float, float, float]:
+    """The box in the map frame around cells with these centres (K, 2) in the grid's frame."""
+    half = 0.5 * working.resolution_m
+    (x0, y0), (x1, y1) = centres.min(axis=0) - half, centres.max(axis=0) + half
+    corners = np.array([[x0, y0], [x1, y0], [x0, y1], [x1, y1]])
+    corners = se2.transform_points(working.origin_xyyaw, corners)
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    return float(low[0]), float(low[1]), float(high[0]), float(high[1])
+
+
+def _moved(
+    new: ChangedRegion,
+    old: ChangedRegion,
+    from_bbox_m: tuple[float, float, float, float],
+    alike: float,
+) -> ChangedRegion:
     return replace(
         new,
         kind="moved",
-        from_bbox_m=old.bbox_m,
+        from_bbox_m=from_bbox_m,
         first_seen_ns=min(new.first_seen_ns, old.first_seen_ns),
         last_seen_ns=max(new.last_seen_ns, old.last_seen_ns),
         views=new.views + old.views,
