@@ -49,6 +49,15 @@ def test_robot_is_found_without_belief_or_initial_pose(healthy):
     assert healthy.margin > 0.05
 
 
+def test_covariance_means_what_it_says(healthy):
+    t_s = (healthy.track.t_ns - healthy.track.t_ns[0]) / 1e9
+    off = healthy.track.xyyaw - true_path(t_s)
+    off[:, 2] = se2.wrap_angle(off[:, 2])
+    nees = np.einsum("ni,nij,nj->n", off, np.linalg.inv(healthy.track.cov), off)
+
+    assert 1.0 < nees.mean() < 6.0
+
+
 def test_right_pose_in_the_room_as_mapped_has_no_changes(healthy):
     assert healthy.changes is not None
     assert np.nanmax(healthy.changes.changed_share) < 0.02
