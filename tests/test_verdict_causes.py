@@ -20,9 +20,11 @@ from slamreplay.perturb.tf_delay import TfDelay
 from slamreplay.testing.synthetic import START_NS, room_grid, synthetic_bundle, true_path
 from slamreplay.verdict.actions import Outcome, actions, risky
 from slamreplay.verdict.belief_error import belief_error
+from slamreplay.verdict.confidence import calibrated, confidence
 from slamreplay.verdict.contract import contract_findings
 from slamreplay.verdict.judge import judge
 from slamreplay.verdict.limits import Limits
+from slamreplay.verdict.map_frame import constant_offset
 from slamreplay.verdict.summary import MOST_CHARACTERS
 from slamreplay.verdict.timing import scan_delay
 from slamreplay.verdict.wheels import wheels
@@ -281,6 +283,38 @@ def test_summaries_are_short_and_do_not_contradict_themselves():
     assert len(both.summary) <= MOST_CHARACTERS
     assert told.state == "healthy"
     assert "1.9" not in told.summary
+
+
+def test_a_localizer_that_follows_the_truth_beside_it_has_another_map_frame():
+    bundle = synthetic_bundle(seconds=25)
+    t = at_scans(bundle)
+    odom = odometry_track(bundle.view()).at(t).xyyaw
+    truth = true_path((t - START_NS) / 1e9)
+    bend = np.column_stack(
+        [0.12 * np.sin(np.arange(len(t)) / 40.0), 0 * odom[:, 0], 0 * odom[:, 0]]
+    )
+    hindsight = hindsight_of(bundle, xyyaw=truth + bend)
+    offset = np.array([1.5, -2.0, 0.0])
+    follows = PoseTrack.without_covariance("map", "base_link", t, truth + bend + offset)
+    start = se2.compose(truth[0] + offset, se2.between(odom[0], odom))
+    drifts = PoseTrack.without_covariance("map", "base_link", t, start)
+    found = [
+        constant_offset(bundle.view(), belief_error(b, hindsight, LIMITS), LIMITS)
+        for b in (follows, drifts)
+    ]
+
+    assert [None if f is None else f.cause for f in found] == ["map", "map_or_start"]
+
+
+def test_confidence_is_monotone_and_never_certain():
+    raw = np.linspace(0.0, 1.0, 21)
+    said = [confidence(np.full(5, p), 1.0) for p in raw]
+
+    assert np.all(np.diff(said) >= 0.0)
+    assert max(said) <= 0.99
+    assert calibrated(0.85) == pytest.approx(0.97, abs=0.01)
+    assert confidence(np.ones(5), 1.0, unspoken=1.0) == pytest.approx(0.5, abs=0.01)
+    assert confidence(np.full(3, np.nan), 1.0) is None
 
 
 # --- the contract ----------------------------------------------------------------------------

@@ -36,6 +36,8 @@ CLEAR, LASTING_NS = 1.5, 10 * NS_PER_S
 #: A delay this long is named as what a log suffers from; one of a tenth of a second and more comes
 #: before a wrong match, for it makes wrong matches.
 DELAY_S = 0.1
+#: Scans that score this part of what they do in the right place fit the wrong one as well.
+ALIKE = 0.9
 #: A change this shortly before the loss has to do with it.
 CHANGED_BEFORE_NS = 10 * NS_PER_S
 
@@ -238,7 +240,7 @@ def _pulled(case: Case, lost: Interval, onset: int) -> Answer | None:
         "than odometry and hindsight"
     )
     inside = (error.t_ns >= lost.start_ns) & (error.t_ns < lost.end_ns) & error.off(case.limits)
-    if fits_at_belief(case.view, error, inside & error.known):
+    if fits_at_belief(case.view, error, inside & error.known, ALIKE):
         text = f"{moved}: its scans fit the map there as well as where it really was"
         return "sensing_ambiguity", 0.7, [text]
     return "association_error", 0.6, [f"{moved}: its scans were matched to the wrong place"]

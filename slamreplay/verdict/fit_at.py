@@ -10,13 +10,20 @@ from slamreplay.bundle.view import BundleView
 from slamreplay.geometry import se2
 from slamreplay.verdict.belief_error import BeliefError
 
-#: A scan at the believed place that scores this part of what it scores at the right one fits.
-LOOKALIKE = 0.9
 _SCANS = 60
 
 
-def fits_at_belief(view: BundleView, error: BeliefError, rows: NDArray[np.bool_]) -> bool:
-    """Whether the scans fit this map at the believed poses as well as at hindsight's."""
+def fits_at_belief(
+    view: BundleView, error: BeliefError, rows: NDArray[np.bool_], part: float
+) -> bool:
+    """Whether scans score at the believed poses at least this part of their score at hindsight's.
+
+    Args:
+        view: the log.
+        error: belief against hindsight.
+        rows: (N,) which of its rows to ask.
+        part: 0 to 1.
+    """
     from slamreplay.maps.likelihood_field import gaussian_field
 
     scans, grid = scan_set(view), view.grid
@@ -44,4 +51,4 @@ def fits_at_belief(view: BundleView, error: BeliefError, rows: NDArray[np.bool_]
     if not scores:
         return False
     at_belief, at_hindsight = np.mean(scores, axis=0)
-    return bool(at_belief >= LOOKALIKE * at_hindsight)
+    return bool(at_belief >= part * at_hindsight)

@@ -120,15 +120,17 @@ def _numbered(tile: Interval, evidence: Evidence, limits: Limits) -> Interval:
     sure = None
     if tile.state != "insufficient_data":
         p = p_off(error, limits)[inside]
-        p = np.where(np.isfinite(p), p, 0.5)  # before the first belief either may be true
+        # Before the first belief either may be true: then the map alone is judged.
+        unspoken = 1.0 - float(np.isfinite(p).mean()) if len(p) else 0.0
         p_state = p if tile.is_lost else 1.0 - p
+        p_state = p_state[np.isfinite(p_state)] if unspoken < 1.0 else np.ones(len(p))
         if changes is not None and len(changes.t_ns):
             rows = (changes.t_ns >= tile.start_ns) & (changes.t_ns < tile.end_ns)
             q = p_changed(changes.changed_share[rows], limits)
             q = q[np.isfinite(q)]
             share = float(q.mean()) if len(q) else 0.5
             p_state = p_state * (share if tile.is_changed else 1.0 - share)
-        sure = confidence(p_state, evidence.trusted)
+        sure = confidence(p_state, evidence.trusted, unspoken)
     return replace(
         tile,
         confidence=sure,
