@@ -152,7 +152,7 @@ def _went_with_it(
 ) -> NDArray[np.bool_]:
     """(H, W) walls that went with the first cells that beams met: those behind them, passed too."""
     reach = 2 * round(BEYOND_M / working.resolution_m) + 1
-    beside = binary_dilation(removed, np.ones((reach, reach), dtype=bool))
+    beside = maximum_filter(removed, reach)
     empty = (pass_bins * BIN_S >= GONE_S) & ~still_seen
     return beside & working.walls & where.fine(empty, working.walls.shape)
 

@@ -7,7 +7,7 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import binary_dilation, find_objects, label
+from scipy.ndimage import find_objects, label, maximum_filter
 from scipy.spatial import cKDTree
 
 from slamreplay.bundle.products import ChangedRegion
@@ -80,7 +80,7 @@ def changed_regions(
 
 def _patches(working: WorkingMap, found: Contradictions) -> list[_Patch]:
     reach = max(1, round(0.5 * JOIN_M / working.resolution_m))
-    labels, count = label(binary_dilation(found.mask, np.ones((2 * reach + 1,) * 2, dtype=bool)))
+    labels, count = label(maximum_filter(found.mask, 2 * reach + 1))
     scan, beam = np.nonzero(found.changed)
     of_beam = labels.ravel()[found.where[scan, beam]]
     cells = np.argwhere(found.mask)
@@ -129,7 +129,13 @@ def _things(working: WorkingMap, old: list[_Patch]) -> list[se2.Array]:
 
 def _pairs(new: list[se2.Array], old: list[se2.Array]) -> list[tuple[int, int, float]]:
     """Index in `new`, index in `old` and likeness of what moved, each at most once."""
-    likeness = np.array([[_alike(a, b) for b in old] for a in new])
+    upright_old = [_upright(b) for b in old]
+    likeness = np.array(
+        [
+            [_alike(a, b, upright, c) for b, c in zip(old, upright_old, strict=True)]
+            for a, upright in ((a, _upright(a)) for a in new)
+        ]
+    )
     pairs: list[tuple[int, int, float]] = []
     while likeness.size and likeness.max() > 0.0:
         i, j = np.unravel_index(np.argmax(likeness), likeness.shape)
@@ -138,16 +144,21 @@ def _pairs(new: list[se2.Array], old: list[se2.Array]) -> list[tuple[int, int, f
     return pairs
 
 
-def _alike(new: se2.Array, old: se2.Array) -> float:
+def _alike(new: se2.Array, old: se2.Array, new_box: se2.Array, old_box: se2.Array) -> float:
     """How much two outlines look alike, 0 (not) to 1.
 
     What was removed is seen on all sides, for beams go through it; of what appeared often only one
     side is. So the new outline is laid over the old one, corner on corner, in all four headings.
+
+    Args:
+        new: (N, 2) cells of what appeared, m.
+        old: (M, 2) cells of what is gone, m.
+        new_box: (N, 2) the same `_upright`.
+        old_box: (M, 2) likewise.
     """
     way = float(np.hypot(*(_middle(new) - _middle(old))))
     if way > FAR_M:
         return 0.0
-    new_box, old_box = _upright(new), _upright(old)
     new_size, old_size = np.sort(new_box.max(axis=0)), np.sort(old_box.max(axis=0))
     least = old_size[1] - LENGTH_M
     if way <= NEAR_M:
