@@ -35,8 +35,8 @@ MOST_SCANS = 500
 _LEAST = 10
 #: Longer delays than this leave the turn that shows them.
 LONGEST_S = 0.7
-#: A delay is worth a word from this on, and where it is so many of its sigmas.
-WORTH_S, SIGMAS = 0.03, 4.0
+#: A delay is worth a word from this on, where it is so many of its sigmas and so many turns tell.
+WORTH_S, SIGMAS, FEWEST_TURNS = 0.03, 4.0, 3
 _FLOOR_S = 0.004
 #: Headings of odometry and map part by so much within a second, without any delay.
 DRIFT_RAD = 0.006
@@ -66,7 +66,8 @@ class Delay:
     @property
     def is_significant(self) -> bool:
         """Whether it is more than noise and large enough for a word."""
-        return abs(self.seconds) >= max(WORTH_S, SIGMAS * self.sigma_s)
+        far = abs(self.seconds) >= max(WORTH_S, SIGMAS * self.sigma_s)
+        return far and self.turns >= FEWEST_TURNS
 
     @property
     def text(self) -> str:
