@@ -113,7 +113,7 @@ def table(
         seeds: one set of faults for each.
         skipped: told which fault does not fit, and why.
     """
-    yield _row("nothing", Injection("none", log.view, log.view.manifest.start_ns), log)
+    yield row("nothing", Injection("none", log.view, log.view.manifest.start_ns), log)
     for seed in seeds:
         rng = np.random.Generator(np.random.PCG64(seed))
         for make in FAULTS:
@@ -122,7 +122,7 @@ def table(
             except UsageError as error:
                 skipped(f"{make.__name__} left out: {error}")
                 continue
-            yield _row(what, injection, log)
+            yield row(what, injection, log)
 
 
 def _judged(view: BundleView, found: Hindsight | None) -> Judgement:
@@ -133,7 +133,8 @@ def _judged(view: BundleView, found: Hindsight | None) -> Judgement:
     return judge(view, recorded_belief(view, found.track.t_ns), found)
 
 
-def _row(what: str, injection: Injection, log: Recorded) -> Row:
+def row(what: str, injection: Injection, log: Recorded) -> Row:
+    """One injection judged and held against its truth."""
     from slamreplay.hindsight.pipeline import hindsight
 
     view = injection.view
@@ -274,8 +275,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
             log = recorded(bundle.view())
             sys.stdout.write("| " + " | ".join(HEADINGS) + " |\n")
             sys.stdout.write("|" + "---|" * len(HEADINGS) + "\n")
-            for row in table(log, range(given.seeds), lambda text: sys.stderr.write(f"{text}\n")):
-                sys.stdout.write("| " + " | ".join(as_texts(row)) + " |\n")
+            for found in table(log, range(given.seeds), lambda text: sys.stderr.write(f"{text}\n")):
+                sys.stdout.write("| " + " | ".join(as_texts(found)) + " |\n")
                 sys.stdout.flush()
     except SlamreplayError as error:
         sys.stderr.write(f"{error}\n")
