@@ -32,11 +32,8 @@ def error_after_alignment(track, t_ns, poses):
 
 def test_hindsight_agrees_with_the_reflectors(real_logs, tmp_path):
     folder = real_logs / "inesctec_jarvis"
-    log, options = (
-        folder / "jarvis_circular_path_fast.bag",
-        IngestOptions(map=folder / f"maps/{name}.yaml"),
-    )
-    bundle = ingest([log], tmp_path / "b", options)
+    options = IngestOptions(map=folder / "maps/i-108_10mm.yaml")
+    bundle = ingest([folder / "jarvis_circular_path_fast.bag"], tmp_path / "b", options)
     found = hindsight(bundle.view())
     t_ns, poses = poses_of(bundle.table("references"))
 
