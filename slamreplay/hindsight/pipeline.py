@@ -5,14 +5,14 @@ It reads neither the recorded belief nor an initial pose: a robot that was lost 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from slamreplay.bundle.products import Changes, Hindsight
-from slamreplay.bundle.scans import scan_sets
+from slamreplay.bundle.scans import ScanSet, scan_sets
 from slamreplay.bundle.track import PoseTrack
 from slamreplay.bundle.view import BundleView
 from slamreplay.geometry import se2
@@ -34,10 +34,12 @@ from slamreplay.hindsight.smoothing import smooth
 from slamreplay.hindsight.submaps import Submap, submaps
 from slamreplay.hindsight.trust import trusted_keyframes
 from slamreplay.maps.grid import OccupancyGrid
-from slamreplay.matching.field import WorkingMap, working_map
+from slamreplay.matching.field import ScoreField, WorkingMap, working_map
 from slamreplay.matching.whole_map import search_space
 
 SIGMA_M = 0.12
+#: A second laser that the map explains this much worse than the first is left out.
+MISFIT = 0.8
 
 Progress = Callable[[str, float], None]
 
@@ -59,6 +61,18 @@ def hindsight(view: BundleView, *, progress: Progress | None = None) -> Hindsigh
     if not lasers or grid is None or working is None:
         return None
     base = view.manifest.frames.base or "base_link"
+    whole = _rebuilt(base, grid, working, lasers, say)
+    return whole or _rebuilt(base, grid, working, lasers[:1], say)
+
+
+def _rebuilt(
+    base: str,
+    grid: OccupancyGrid,
+    working: WorkingMap,
+    lasers: Sequence[ScanSet],
+    say: Progress,
+) -> Hindsight | None:
+    """Hindsight from these lasers; None where the map explains the second far worse."""
     say("keyframes", 0.0)
     motion = lasers[0].odometry
     if motion is None or not motion.has_pose.any():
@@ -99,6 +113,8 @@ def hindsight(view: BundleView, *, progress: Progress | None = None) -> Hindsigh
     carried, scan_cov = settle(carried, cov[share], odometry, keys[share], doubt, beams, field)
     carried[~trusted[share]], scan_cov[~trusted[share]] = np.nan, np.nan
     match = scan_scores(field, beams, carried)
+    if len(each) > 1 and _second_misfits(field, each, carried, motion):
+        return None
     say("changes", 0.85)
     changes = _changes(grid, working, each, carried, motion)
     say("changes", 1.0)
@@ -113,6 +129,22 @@ def hindsight(view: BundleView, *, progress: Progress | None = None) -> Hindsigh
         places.margin,
         changes,
     )
+
+
+def _second_misfits(
+    field: ScoreField, each: list[Beams], poses: se2.Array, motion: PoseTrack
+) -> bool:
+    """Whether the second laser sees another world than the map shows and the first one meets.
+
+    A safety laser near the floor sees pallets and feet of chairs in a map that was drawn at the
+    height of the first; all it would add is a worse place.
+    """
+    both, both_poses, is_first = interleaved(each[0], each[1], poses, motion)
+    scores = scan_scores(field, both, both_poses)
+    ours, theirs = scores[is_first], scores[~is_first]
+    if not (np.isfinite(ours).any() and np.isfinite(theirs).any()):
+        return False
+    return bool(np.nanmedian(theirs) < MISFIT * np.nanmedian(ours))
 
 
 def odometry_at(motion: PoseTrack, t_ns: NDArray[np.int64]) -> se2.Array:
