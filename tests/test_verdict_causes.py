@@ -306,6 +306,21 @@ def test_a_localizer_that_follows_the_truth_beside_it_has_another_map_frame():
     assert [None if f is None else f.cause for f in found] == ["map", "map_or_start"]
 
 
+def test_a_belief_that_was_right_at_first_has_no_other_map_frame():
+    bundle = synthetic_bundle(seconds=60)
+    t = (at_scans(bundle) - START_NS) / 1e9
+    belief = recorded_belief(bundle.view(), at_scans(bundle))
+    found = []
+    for from_s in (-1.0, 5.0):
+        later = np.outer(t > from_s, [1.5, -2.0, 0.0])
+        moved = replace(belief, xyyaw=belief.xyyaw + later)
+        error = belief_error(moved, hindsight_of(bundle), LIMITS)
+        found.append(constant_offset(bundle.view(), error, LIMITS))
+
+    assert found[0] is not None
+    assert found[1] is None
+
+
 def test_confidence_is_monotone_and_never_certain():
     raw = np.linspace(0.0, 1.0, 21)
     said = [confidence(np.full(5, p), 1.0) for p in raw]

@@ -49,6 +49,13 @@ def constant_offset(view: BundleView, error: BeliefError, limits: Limits) -> Con
         return None
     if spread_m > min(SPREAD_M, max(0.5 * at_robot_m, 0.05)) or spread_rad > SPREAD_RAD:
         return None
+    # Nine rows of ten leave room for the stretch before a kidnap, in which the belief was right.
+    apart = (np.hypot(rest[:, 0], rest[:, 1]) > limits.position_m) | (
+        np.abs(se2.wrap_angle(rest[:, 2])) > limits.yaw_rad
+    )
+    held_s = np.diff(error.t_ns[rows], append=error.t_ns[rows][-1]) / 1e9
+    if float(np.minimum(held_s, 1.0)[apart].sum()) >= limits.lost_s:
+        return None
     cause: Cause = "map_or_start"
     if _corrected(view, error, rows, spread_m):
         cause = "lookalike" if fits_at_belief(view, error, rows, LOOKALIKE) else "map"
