@@ -28,6 +28,7 @@ from slamreplay.hindsight.places import (
     JUMP_SOLID,
     best_places,
 )
+from slamreplay.hindsight.reseating import reseated
 from slamreplay.hindsight.search import hypotheses_of
 from slamreplay.hindsight.seating import seat_keyframes
 from slamreplay.hindsight.smoothing import smooth
@@ -106,9 +107,15 @@ def _rebuilt(
     start, is_open = seat_keyframes(field, points, chain, found, places)
     say("pose graph", 0.7)
     poses, cov = smooth(field, points, start, chain, is_open)
-    say("every scan", 0.8)
     key_beams = Beams(beams.t_ns[keys], beams.ends[keys], beams.kind[keys], beams.laser_xy)
-    trusted = trusted_keyframes(places, chain, is_open, cov, scan_scores(field, key_beams, poses))
+    key_scores = scan_scores(field, key_beams, poses)
+    typical = float(np.median(places.score))
+    again = reseated(space, points, poses, chain, is_open, key_scores, typical)
+    if again is not None:
+        poses, cov = smooth(field, points, again[0], chain, again[1])
+        is_open, key_scores = again[1], scan_scores(field, key_beams, poses)
+    say("every scan", 0.8)
+    trusted = trusted_keyframes(places, chain, is_open, cov, key_scores)
     carried, share, doubt = carry(odometry, keys, poses, is_open, beams, field)
     carried, scan_cov = settle(carried, cov[share], odometry, keys[share], doubt, beams, field)
     carried[~trusted[share]], scan_cov[~trusted[share]] = np.nan, np.nan
