@@ -54,7 +54,8 @@ def constant_offset(view: BundleView, error: BeliefError, limits: Limits) -> Con
         np.abs(se2.wrap_angle(rest[:, 2])) > limits.yaw_rad
     )
     held_s = np.diff(error.t_ns[rows], append=error.t_ns[rows][-1]) / 1e9
-    if float(np.minimum(held_s, 1.0)[apart].sum()) >= limits.lost_s:
+    right = apart & ~error.off(limits)[rows]
+    if float(np.minimum(held_s, 1.0)[right].sum()) >= limits.lost_s:
         return None
     cause: Cause = "map_or_start"
     if _corrected(view, error, rows, spread_m):
