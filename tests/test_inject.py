@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from slamreplay.bench import inject
+from slamreplay.bench import inject, inject_map
 from slamreplay.bundle.belief import recorded_belief
 from slamreplay.bundle.odometry import odometry_track
 from slamreplay.bundle.track import PoseTrack
@@ -87,24 +87,24 @@ def test_wrong_start_moves_the_belief_from_a_time_on(view):
 def test_map_edits_change_their_box_and_nothing_else(view):
     grid = view.grid
     island = _box(grid, (80, 100), (100, 140))
-    gone = inject.appeared(view, island)
+    gone = inject_map.appeared(view, island)
     assert (gone.view.grid.cells[80:100, 100:140] == 0).all()
     np.testing.assert_allclose(gone.box_m, _around(grid, (80, 100), (100, 140)), atol=1e-6)
 
     spot = grid.centre_of([40, 60])
-    drawn = inject.removed(view, (*(spot - 0.2), *(spot + 0.2)))
+    drawn = inject_map.removed(view, (*(spot - 0.2), *(spot + 0.2)))
     new = drawn.view.grid.occupied & ~grid.occupied
     assert 30 < new.sum() < 80
     assert ((grid.centre_of(np.argwhere(new)) - spot) ** 2).max() < 0.2**2 + 1e-9
 
-    other = inject.moved(view, island, (0.0, 1.0))
+    other = inject_map.moved(view, island, (0.0, 1.0))
     assert (other.view.grid.cells != grid.cells).sum() <= 2 * 800
     assert other.view.grid.occupied.sum() == pytest.approx(grid.occupied.sum(), abs=60)
     np.testing.assert_allclose(other.box_m, gone.box_m)
     assert other.from_box_m[1] - other.box_m[1] == pytest.approx(1.0, abs=0.1)
     assert view.grid.version == grid.version
     with pytest.raises(UsageError, match="no mapped wall"):
-        inject.appeared(view, (*(spot - 0.2), *(spot + 0.2)))
+        inject_map.appeared(view, (*(spot - 0.2), *(spot + 0.2)))
 
 
 def _box(grid, rows, cols):
@@ -140,7 +140,7 @@ def test_a_wall_at_the_edge_of_the_unknown_leaves_known_room_behind():
     view = bundle.view().with_grid(dark)
     box = _box(grid, (0, 3), (60, 80))
 
-    edited = inject.appeared(view, box).view.grid
+    edited = inject_map.appeared(view, box).view.grid
 
     assert (edited.cells[:2, 62:78] == 0).all()
     assert (edited.cells[0, 100:] == -1).all()

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from slamreplay.bench import inject, real, real_faults
+from slamreplay.bench.injection import Injection
 from slamreplay.bundle.scans import scan_set
 from slamreplay.geometry.times import NS_PER_S
 from slamreplay.testing.synthetic import START_NS, synthetic_bundle, true_path
@@ -19,7 +20,7 @@ def log():
 
 
 def test_nothing_done_makes_nothing_true(log):
-    injection = inject.Injection("none", log.view, START_NS)
+    injection = Injection("none", log.view, START_NS)
     assert not real.true_lost(injection.view, log.track_ns, log.xyyaw).any()
 
 
@@ -43,7 +44,7 @@ def test_chosen_edits_contradict_enough_beams_for_long_enough(log, make):
 
 def test_unedited_maps_contradict_no_beam(log):
     box = next(real_faults.seen_boxes(log, np.random.Generator(np.random.PCG64(0))))
-    same = inject.Injection("moved", log.view, START_NS, box, box)
+    same = Injection("moved", log.view, START_NS, box, box)
     assert real_faults.edited_beams(same, log).max() == 0.0
 
 

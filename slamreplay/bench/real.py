@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slamreplay.bench import inject
-from slamreplay.bench.inject import Box, Injection
+from slamreplay.bench.injection import Box, Injection
 from slamreplay.bench.real_faults import FAULTS, Flags, Recorded, edited_beams
 from slamreplay.bundle.belief import recorded_belief
 from slamreplay.bundle.products import Hindsight

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from slamreplay.bench import inject
-from slamreplay.bench.inject import Box, Injection
+from slamreplay.bench import inject, inject_map
+from slamreplay.bench.injection import Box, Injection
 from slamreplay.bundle.scans import ScanSet
 from slamreplay.bundle.view import BundleView
 from slamreplay.errors import UsageError
@@ -84,7 +84,7 @@ def wrong_start(log: Recorded, rng: np.random.Generator) -> tuple[str, Injection
 def appeared(log: Recorded, rng: np.random.Generator) -> tuple[str, Injection]:
     """A piece of wall that the map does not have."""
     for box in seen_boxes(log, rng):
-        injection = inject.appeared(log.view, box)
+        injection = inject_map.appeared(log.view, box)
         if _shows(injection, log):
             return f"walls off the map at {_text(box)}", injection
     raise UsageError(_UNSEEN)
@@ -93,7 +93,7 @@ def appeared(log: Recorded, rng: np.random.Generator) -> tuple[str, Injection]:
 def removed(log: Recorded, rng: np.random.Generator) -> tuple[str, Injection]:
     """A piece of wall that only the map has."""
     for box in free_boxes(log, rng):
-        injection = inject.removed(log.view, box)
+        injection = inject_map.removed(log.view, box)
         if _shows(injection, log):
             return f"walls drawn at {_text(box)}", injection
     raise UsageError("no free place beside the path is seen by enough beams for long enough")
@@ -105,7 +105,7 @@ def moved(log: Recorded, rng: np.random.Generator) -> tuple[str, Injection]:
         centre = np.array([box[0] + box[2], box[1] + box[3]]) / 2
         near = log.xyyaw[np.nanargmin(np.hypot(*(log.xyyaw[:, :2] - centre).T)), :2]
         shift = (near - centre) / np.linalg.norm(near - centre) * 0.7
-        injection = inject.moved(log.view, box, shift)
+        injection = inject_map.moved(log.view, box, shift)
         if _shows(injection, log):
             what = f"walls of {_text(box)} drawn {shift[0]:+.1f}, {shift[1]:+.1f} m away"
             return what, injection
