@@ -16,7 +16,7 @@ from slamreplay.bundle.scans import ScanSet, scan_sets
 from slamreplay.bundle.track import PoseTrack
 from slamreplay.bundle.view import BundleView
 from slamreplay.geometry import se2
-from slamreplay.geometry.covariance import planar_from_gtsam
+from slamreplay.geometry.covariance import turned
 from slamreplay.hindsight.beams import Beams, beams_of, interleaved, side_by_side
 from slamreplay.hindsight.carry import carry, scan_scores, settle
 from slamreplay.hindsight.chain import Chain, scan_matched
@@ -231,4 +231,4 @@ def _to_track(
 ) -> PoseTrack:
     """Out of the grid's frame: its origin's yaw turns poses and covariances."""
     in_map = np.where(np.isfinite(poses), working.to_map(poses), np.nan)
-    return PoseTrack(frame, base, t_ns, in_map, planar_from_gtsam(cov, working.origin_xyyaw[2]))
+    return PoseTrack(frame, base, t_ns, in_map, turned(cov, working.origin_xyyaw[2]))
