@@ -10,6 +10,7 @@ from typer.testing import CliRunner
 from slamreplay.bench import runner
 from slamreplay.bench.baselines import misalignment
 from slamreplay.bench.conditions import CONDITIONS
+from slamreplay.bench.goals import missed, parse_goals
 from slamreplay.bench.incidents import KINDS
 from slamreplay.bench.measure import Measured, measured
 from slamreplay.bench.rates import auc, best_f1, f1, share
@@ -17,7 +18,8 @@ from slamreplay.bench.schedule import DEFAULT_LOGS, HELD_FROM, Case, schedule
 from slamreplay.bench.scores import calibration, scores
 from slamreplay.bench.store import read_measured, write_measured
 from slamreplay.bench.table import page
-from slamreplay.errors import OutputError
+from slamreplay.errors import OutputError, UsageError
+from slamreplay.verdict.reliability import measured_reliability, reliability_of
 
 N = 200
 
@@ -223,6 +225,15 @@ def test_command_prints_the_tables(tmp_path, monkeypatch):
     assert "| lost, F1 per moment |" in result.stdout
     assert ">= 0.995" in result.stdout
     assert json.loads((target / "results.json").read_text())["scores"]["logs"] == 30
+    record = reliability_of(json.loads((target / "reliability.json").read_text()))
+    assert record.logs == 30
+    assert record.moments > 1000
+    assert (target / "reliability.svg").read_bytes().startswith(b"<?xml")
+
+    refused = CliRunner().invoke(app, [*words, "--at-least", "calibration.ece=0.5"])
+
+    assert refused.exit_code == 1
+    assert "calibration.ece is" in refused.stderr
 
 
 def test_residuals_of_a_wrong_pose_are_called_misaligned():
@@ -231,3 +242,39 @@ def test_residuals_of_a_wrong_pose_are_called_misaligned():
 
     assert misalignment(right) < 0.5
     assert misalignment(wrong[wrong < 1.0]) > 1.0
+
+
+def test_goals_are_bounds_on_figures():
+    found = scores([made_up(), made_up(seed=2, judged="healthy", late=100)])
+
+    assert not missed(found, parse_goals(["lost.precision=0.3", "log_accuracy=0.5"], ">="))
+    assert missed(found, parse_goals(["log_accuracy=0.9"], ">=")) == [
+        "log_accuracy is 0.5, wanted >= 0.9"
+    ]
+    assert not missed(found, parse_goals(["lost_on_healthy_logs=0"], "<="))
+    # What could not be measured was not reached.
+    assert missed(found, parse_goals(["wrong_map_told=1"], ">="))
+
+
+@pytest.mark.parametrize("text", ["lost.f1", "lost.f1=much", "", "=0.3x"])
+def test_goal_without_a_number_is_refused(text):
+    with pytest.raises(UsageError, match="no FIGURE=NUMBER"):
+        parse_goals([text], ">=")
+
+
+@pytest.mark.parametrize("name", ["found", "lost.f2", "calibration.bins.x", "lost"])
+def test_goal_for_a_figure_that_is_not_there_is_refused(name):
+    with pytest.raises(UsageError):
+        missed(scores([made_up()]), parse_goals([f"{name}=0.5"], ">="))
+
+
+def test_shipped_reliability_was_measured_on_many_moments():
+    record = measured_reliability()
+
+    assert record.logs >= 20
+    assert record.ece is not None
+    assert reliability_of(json.loads(json.dumps(record.as_json()))) == record
+    best = record.bin_of(0.99)
+    assert best is not None
+    assert best.moments > 1000
+    assert best.right > 0.9

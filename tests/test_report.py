@@ -34,6 +34,7 @@ from slamreplay.report.writer import write_report
 from slamreplay.testing.synthetic import START_NS, room_grid, synthetic_bundle, true_path
 from slamreplay.verdict.judgement import Action, FailureMode, Interval, Judgement, Stop
 from slamreplay.verdict.limits import Limits
+from slamreplay.verdict.reliability import Bin, Reliability
 
 S = 1_000_000_000
 HOSTILE = '<script>alert(1)</script> & "quoted" \x00\x1b[31m \ud800'
@@ -313,7 +314,7 @@ def test_page_shows_the_verdict_the_figures_and_what_is_missing(folder, bare):
     text = (folder / "report.html").read_text(encoding="utf-8")
     images = _Page(text).all("img")
 
-    assert len(images) == 3
+    assert len(images) == 4
     assert all(image["alt"] for image in images)
     assert "The robot was lost for 10\N{NO-BREAK SPACE}s." in text
     assert FINDINGS["SR-LOC-001"].misleads in text
@@ -324,6 +325,25 @@ def test_page_shows_the_verdict_the_figures_and_what_is_missing(folder, bare):
     assert "No path is known" in empty
     assert "no localizer spoke" in empty
     assert "No imu" in empty
+
+
+def test_confidence_is_said_with_how_often_it_was_right(post, bare):
+    record = Reliability(40, 0, 0.031, (Bin(0.9, 1.0, 0.97, 0.945, 12_000, 38),))
+    sure = replace(post, judgement=replace(post.judgement, confidence=0.93), reliability=record)
+    unheard = replace(sure, judgement=replace(post.judgement, confidence=0.2))
+
+    page = html(sure)
+
+    page = page.replace("\N{NO-BREAK SPACE}", " ")
+    assert "said with 93 % confidence" in page
+    assert "94.5 %" in page
+    assert "40 simulated logs" in page
+    assert "Nothing was ever said with 20 % confidence" in html(unheard).replace(
+        "\N{NO-BREAK SPACE}", " "
+    )
+    assert "What the confidence means" not in html(
+        replace(bare, reliability=replace(record, bins=()))
+    )
 
 
 def test_facts_are_numbers_of_the_post_mortem(post, bare):

@@ -21,8 +21,12 @@ from slamreplay.bench.store import fingerprint, read_measured, write_measured
 from slamreplay.bench.table import page
 from slamreplay.bundle.atomic import check_target, write_file
 from slamreplay.errors import OutputError
+from slamreplay.report.figures import canvas
+from slamreplay.report.figures.reliability import reliability_figure
+from slamreplay.verdict.reliability import Bin, Reliability
 
 RESULTS, PAGE, LOGS = "results.json", "results.md", "logs"
+RELIABILITY, DIAGRAM = "reliability.json", "reliability.svg"
 
 
 def run_benchmark(
@@ -64,6 +68,7 @@ def run_benchmark(
     found = [done[c] for c in cases]
     results = results_of(found, seed, split)
     write_file(target / PAGE, page(results).encode())
+    _write_reliability(target, results)
     text = json.dumps(results, indent=1, allow_nan=False, sort_keys=True)
     write_file(target / RESULTS, text.encode())
     return results
@@ -83,6 +88,20 @@ def results_of(found: Sequence[Measured], seed: int, split: Split) -> dict[str, 
         "conditions": {c: scores([m for m in found if c in m.case.conditions]) for c in hard},
         "cases": [_told(m) for m in found],
     }
+
+
+def _write_reliability(target: Path, results: dict[str, Any]) -> None:
+    """The record a version ships with (`slamreplay.verdict.reliability`), and its diagram."""
+    total = results["scores"]
+    sure = total["calibration"]
+    bins = tuple(Bin(**b) for b in sure["bins"])
+    record = Reliability(total["logs"], results["seed"], sure["ece"][0], bins)
+    text = json.dumps(record.as_json(), indent=1, allow_nan=False)
+    write_file(target / RELIABILITY, (text + "\n").encode())
+    with canvas.plain_style():
+        figure = reliability_figure(record, canvas.BESIDE)
+        if figure is not None:
+            write_file(target / DIAGRAM, canvas.svg_bytes(figure))
 
 
 def _judged(cases: Sequence[Case], jobs: int) -> Any:

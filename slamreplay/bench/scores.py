@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 from slamreplay.bench.baselines import FIELD_THRESHOLDS
 from slamreplay.bench.measure import Measured
 from slamreplay.bench.rates import Rate, auc, best_f1, clustered, f1, share
+from slamreplay.verdict.reliability import Bin
 
 FOUR = ("healthy", "lost", "map_changed", "lost_and_map_changed")
 #: Moments this near to a true edge are left out; the figure with them stands beside.
@@ -233,8 +235,8 @@ def calibration(logs: Sequence[Measured]) -> dict[str, Any]:
         return float(np.abs(gap).sum() / w.sum()) if w.sum() else np.nan
 
     bins = [
-        {"from": k / _BINS, "moments": int((at == k).sum()), "logs": len(set(of[at == k].tolist())),
-         "said": float(p[at == k].mean()), "right": float(ok[at == k].mean())}
+        asdict(Bin(k / _BINS, (k + 1) / _BINS, float(p[at == k].mean()), float(ok[at == k].mean()),
+                   int((at == k).sum()), len(set(of[at == k].tolist()))))
         for k in range(_BINS) if (at == k).any()
     ]  # fmt: skip
     whole = [(m.facts["confidence"], is_right(m)) for m in logs]

@@ -84,7 +84,7 @@ def page(results: Mapping[str, Any]) -> str:
     lines += _table(
         head,
         [
-            (f"{b['from']:.1f}", str(b["moments"]), str(b["logs"]), f"{b['said']:.3f}",
+            (f"{b['low']:.1f}", str(b["moments"]), str(b["logs"]), f"{b['said']:.3f}",
              f"{b['right']:.3f}")
             for b in total["calibration"]["bins"]
         ],

@@ -39,15 +39,25 @@ def verdict(
         list[str] | None,
         typer.Option("--condition", help="Only this condition; several by repeating it."),
     ] = None,
+    at_least: Annotated[
+        list[str] | None,
+        typer.Option("--at-least", metavar="FIGURE=NUMBER", help="Exit with 1 where it is lower."),
+    ] = None,
+    at_most: Annotated[
+        list[str] | None,
+        typer.Option("--at-most", metavar="FIGURE=NUMBER", help="Exit with 1 where it is higher."),
+    ] = None,
     jobs: Annotated[int, typer.Option("--jobs", min=1, help="Processes.")] = 2,
     as_json: Json = False,
 ) -> None:
     """Judge simulated incidents of every kind and compare with the truth.
 
-    Writes results.json and results.md; a run that was stopped goes on where it was. Held seeds are
-    played unless --train is given: nothing of the program is tuned on those.
+    Writes results.json, results.md and the reliability diagram; a run that was stopped goes on
+    where it was. Held seeds are played unless --train is given: nothing of the program is tuned on
+    those. A FIGURE is a path into the scores of results.json, as log_accuracy or lost.f1.
     """
     from slamreplay.bench.conditions import CONDITIONS
+    from slamreplay.bench.goals import missed, parse_goals
     from slamreplay.bench.incidents import KINDS
     from slamreplay.bench.runner import PAGE, run_benchmark
     from slamreplay.bench.schedule import DEFAULT_LOGS
@@ -59,6 +69,7 @@ def verdict(
         for name in given or ():
             if name not in known:
                 raise UsageError(f"there is no '{name}'", hint=", ".join(known))
+    goals = [*parse_goals(at_least or [], ">="), *parse_goals(at_most or [], "<=")]
     is_chosen = bool(kind or condition)
     with progress_bar("benchmark") as progress:
         results = run_benchmark(
@@ -78,3 +89,8 @@ def verdict(
     else:
         typer.echo(page(results))
         typer.echo(str(output / PAGE), err=True)
+    lines = missed(results["scores"], goals)
+    for line in lines:
+        typer.echo(line, err=True)
+    if lines:
+        raise typer.Exit(1)

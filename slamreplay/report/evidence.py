@@ -20,6 +20,7 @@ from slamreplay.geometry.times import seconds_since
 from slamreplay.maps.grid import OccupancyGrid
 from slamreplay.verdict.judgement import ConstantOffset, Judgement
 from slamreplay.verdict.limits import Limits
+from slamreplay.verdict.reliability import Reliability, measured_reliability
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,6 +49,7 @@ class Postmortem:
         frame_offset: what the verdict took out of the belief: its map lies elsewhere than this one.
         nees: of the belief at its own updates, None without covariance or reference.
         trials: perturbation trials, baseline first.
+        reliability: how often what was said with a confidence was right, as measured.
     """
 
     manifest: Manifest
@@ -63,6 +65,7 @@ class Postmortem:
     frame_offset: ConstantOffset | None = None
     nees: Nees | None = None
     trials: tuple[TrialResult, ...] = ()
+    reliability: Reliability = field(default_factory=measured_reliability)
 
     def seconds(self, t_ns: ArrayLike) -> se2.Array:
         """Seconds since the log's start, for text and figures."""

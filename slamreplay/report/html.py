@@ -17,6 +17,7 @@ from slamreplay.report.figures import canvas
 from slamreplay.report.figures.course import course_figure
 from slamreplay.report.figures.covariance import covariance_figure
 from slamreplay.report.figures.map import map_figure
+from slamreplay.report.figures.reliability import reliability_figure
 from slamreplay.report.page import Page, page
 from slamreplay.report.phrases import bound
 
@@ -56,6 +57,7 @@ def _pictures(post: Postmortem, view: Page) -> dict[str, Picture | None]:
         "map": _picture(post, map_figure, canvas.BESIDE, view.map_alt),
         "course": _picture(post, course_figure, canvas.WIDE, view.course_alt),
         "covariance": _picture(post, covariance_figure, canvas.WIDE, view.covariance_alt),
+        "reliability": _picture(post, _reliability, canvas.BESIDE, view.reliability_alt),
     }
 
 
@@ -65,6 +67,10 @@ def _picture(
     with canvas.plain_style():
         wide, narrow = draw(post, width_in), draw(post, canvas.NARROW)
         return None if wide is None or narrow is None else Picture(_uri(wide), _uri(narrow), alt)
+
+
+def _reliability(post: Postmortem, width_in: float) -> Figure | None:
+    return reliability_figure(post.reliability, width_in, post.judgement.confidence)
 
 
 def _uri(figure: Figure) -> str:

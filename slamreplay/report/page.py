@@ -80,6 +80,8 @@ class Page:
     covariance_alt: str
     reference_note: str
     trials_note: str
+    confidence_note: str
+    reliability_alt: str
 
 
 def page(post: Postmortem) -> Page:
@@ -137,6 +139,8 @@ def page(post: Postmortem) -> Page:
         covariance_alt=phrases.covariance_alt(post),
         reference_note=phrases.reference_note(post),
         trials_note=phrases.trials_note(post),
+        confidence_note=phrases.confidence_note(judgement.confidence, post.reliability),
+        reliability_alt=phrases.reliability_alt(post.reliability),
     )
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from slamreplay.geometry.times import NS_PER_S
 from slamreplay.report.evidence import Postmortem
 from slamreplay.report.words import STATES
+from slamreplay.verdict.reliability import Reliability
 
 #: What stands in a cell for a number that is not known.
 NOT_KNOWN = "-"
@@ -105,3 +106,28 @@ def reference_note(post: Postmortem) -> str:
             "over-confidence and never proves consistency."
         )
     return f"Measured against the log's own reference ({post.reference_kind.replace('_', ' ')})."
+
+
+def confidence_note(confidence: float | None, record: Reliability) -> str:
+    """How often states said with this confidence were the true ones."""
+    where = (
+        f"on {record.logs} simulated logs that nothing of the program was tuned on "
+        f"({record.moments:,} moments, expected calibration error {short(record.ece)}). "
+        "Real robots may fail in ways that no simulation shows."
+    )
+    if confidence is None:
+        return f"This log's state has no confidence. The diagram was measured {where}"
+    alike = record.bin_of(confidence)
+    if alike is None:
+        return f"Nothing was ever said with {percent(confidence)} confidence {where}"
+    low, high, right = (f"{100.0 * x:.3g}" for x in (alike.low, alike.high, alike.right))
+    return (
+        f"This log's state is said with {percent(confidence)} confidence. Moments said with {low} "
+        f"to {high} % were right in {right} % of the cases, measured {where}"
+    )
+
+
+def reliability_alt(record: Reliability) -> str:
+    """The reliability diagram in words."""
+    rows = (f"said {b.said:.2f}, right {b.right:.2f}" for b in record.bins)
+    return "Reliability diagram: " + "; ".join(rows) + "."
