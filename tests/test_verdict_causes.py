@@ -27,6 +27,7 @@ from slamreplay.verdict.limits import Limits
 from slamreplay.verdict.map_frame import constant_offset
 from slamreplay.verdict.summary import MOST_CHARACTERS
 from slamreplay.verdict.timing import scan_delay
+from slamreplay.verdict.wander import is_pulled_back
 from slamreplay.verdict.wheels import wheels
 
 LIMITS = Limits()
@@ -304,6 +305,45 @@ def test_a_localizer_that_follows_the_truth_beside_it_has_another_map_frame():
     ]
 
     assert [None if f is None else f.cause for f in found] == ["map", "map_or_start"]
+
+
+def test_dead_reckoning_wanders_and_a_localizer_is_pulled_back():
+    rng = np.random.default_rng(0)
+    way = np.arange(0.0, 40.0, 0.08)
+    where = np.column_stack([way, 0 * way, 0 * way])
+    steps = rng.normal(0.0, (0.006, 0.006, 0.002), (20, len(way), 3))
+    noise = rng.normal(0.0, (0.05, 0.05, 0.02), (20, len(way), 3))
+    walks = np.cumsum(steps, axis=1) + 0.2 * noise
+    pulled = [is_pulled_back(where, rest - rest.mean(axis=0)) for rest in noise]
+    wandered = [is_pulled_back(where, rest - rest.mean(axis=0)) for rest in walks]
+
+    assert np.mean(pulled) == 1.0
+    assert np.mean(wandered) <= 0.3
+    assert not is_pulled_back(where[:100], noise[0, :100])
+
+
+def test_without_odometry_a_belief_that_does_not_wander_tells_the_map_frame():
+    bundle = synthetic_bundle(seconds=60)
+    t = at_scans(bundle)
+    tables = [TABLES[name] for name in ("odometry", "transforms")]
+    bare = bundle.view()
+    for schema in tables:
+        table = bundle.table(schema.name)
+        static = table["is_static"] if schema.name == "transforms" else np.zeros(len(table), bool)
+        bare = bare.with_table(table.take(static))
+    truth = true_path((t - START_NS) / 1e9)
+    rng = np.random.default_rng(1)
+    turn = np.array([1.5, -2.0, 0.05])
+    right = se2.compose(turn, truth + rng.normal(0.0, (0.06, 0.06, 0.03), truth.shape))
+    walk = np.cumsum(rng.normal(0.0, (0.005, 0.005, 0.0005), truth.shape), axis=0)
+    found = []
+    for xyyaw in (right, se2.compose(turn, truth + walk - walk.mean(axis=0))):
+        belief = PoseTrack.without_covariance("map", "base_link", t, xyyaw)
+        error = belief_error(belief, hindsight_of(bundle), LIMITS)
+        found.append(constant_offset(bare, error, LIMITS))
+
+    assert [f.cause for f in found] == ["map", "map_or_start"]
+    assert found[0].xyyaw == pytest.approx(turn, abs=0.05)
 
 
 def test_a_belief_that_was_right_at_first_has_no_other_map_frame():

@@ -113,7 +113,7 @@ def _mode(
         spread = f"nine of ten moments within {offset.spread_m:.2f} m of it"
         words = (
             f"belief and map differ by one constant transform, {offset.text}: {spread}",
-            "the localizer kept correcting its odometry, so its scans fitted the map it had",
+            "no drift added up: the localizer kept correcting itself in the map it had",
         )
         return FailureMode("wrong_map", 0.9, words)
     error = evidence.error

@@ -88,7 +88,7 @@ class _Heading:
     def at(self, t_ns: NDArray[np.int64], late_s: float = 0.0) -> se2.Array:
         """Headings `late_s` before times (M,), NaN outside."""
         back = (t_ns - self.t_ns[0]) - ns(late_s)
-        return np.interp(back, self.t_ns - self.t_ns[0], self.yaw, np.nan, np.nan)
+        return np.asarray(np.interp(back, self.t_ns - self.t_ns[0], self.yaw, np.nan, np.nan))
 
     def rate(self, t_ns: NDArray[np.int64], late_s: float = 0.0) -> se2.Array:
         """Turn rates in rad/s, the same way."""
