@@ -122,6 +122,34 @@ def test_calibration_sees_overconfidence():
     assert boasting["ece"][0] == pytest.approx(0.17, abs=0.03)
 
 
+def test_one_identical_aisle_off_is_told_from_changed():
+    no = np.zeros(N, dtype=bool)
+    calm = np.full(N, 0.2)
+    changed = made_up("boxes_added", state="map_changed", lost=no, changed=~no, ratio=calm)
+    found = scores([made_up("identical_aisles"), made_up("wheel_slip"), changed])
+
+    assert found["auc_identical_aisle_against_changed"][0] == 1.0
+    blind = replace(changed, moments={**changed.moments, "ratio": np.full(N, 4.0)})
+    worse = scores([made_up("identical_aisles"), blind])
+    assert worse["auc_identical_aisle_against_changed"][0] == 0.0
+
+
+def test_wrongly_judged_log_gets_its_report(tmp_path, monkeypatch):
+    wrote = []
+    monkeypatch.setattr(
+        runner,
+        "measured",
+        lambda c: replace(made_up(judged="healthy" if c.seed else "lost"), case=c),
+    )
+    monkeypatch.setattr(runner, "write_case", lambda case, folder: wrote.append((case, folder)))
+
+    runner.run_benchmark(
+        tmp_path, logs=2, kinds=["push"], conditions=[], split="train", jobs=1, reports=True
+    )
+
+    assert wrote == [(Case("push", 1), tmp_path / "failures")]
+
+
 def test_baselines_are_scored_beside():
     found = scores([made_up(seed=1), made_up(seed=3)])["baselines"]
 

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from slamreplay.bench.conditions import CONDITIONS
+from slamreplay.bench.failures import write_case
 from slamreplay.bench.incidents import KINDS
 from slamreplay.bench.measure import Measured, measured
 from slamreplay.bench.schedule import Case, Split, schedule
@@ -25,7 +26,7 @@ from slamreplay.report.figures import canvas
 from slamreplay.report.figures.reliability import reliability_figure
 from slamreplay.verdict.reliability import Bin, Reliability
 
-RESULTS, PAGE, LOGS = "results.json", "results.md", "logs"
+RESULTS, PAGE, LOGS, FAILURES = "results.json", "results.md", "logs", "failures"
 RELIABILITY, DIAGRAM = "reliability.json", "reliability.svg"
 
 
@@ -38,11 +39,13 @@ def run_benchmark(
     kinds: Sequence[str] = KINDS,
     conditions: Sequence[str] = tuple(CONDITIONS),
     jobs: int = 2,
+    reports: bool = False,
     progress: Callable[[str, float], None] | None = None,
 ) -> dict[str, Any]:
     """Judge incidents and write results.json and results.md; the results.
 
-    Logs that the same code has judged before in this folder are not judged again.
+    Logs that the same code has judged before in this folder are not judged again. With `reports`
+    each log that was judged wrongly gets its report, in the folder `failures`.
 
     Raises:
         OutputError: the folder is somebody else's or cannot be written.
@@ -71,6 +74,10 @@ def run_benchmark(
     _write_reliability(target, results)
     text = json.dumps(results, indent=1, allow_nan=False, sort_keys=True)
     write_file(target / RESULTS, text.encode())
+    wrong = [m.case for m in found if reports and not is_right(m) and "error" not in m.facts]
+    for i, case in enumerate(wrong):
+        say(f"report of {case.name}", i / len(wrong))
+        write_case(case, target / FAILURES)
     return results
 
 

@@ -41,6 +41,11 @@ def scores(logs: Sequence[Measured]) -> dict[str, Any]:
     out["hindsight"] = _hindsight(judged)
     out["regions"] = _regions(judged)
     out["auc_lost_against_changed"] = _auc(judged, "ratio", against_changed=True).as_json()
+    out["auc_identical_aisle_against_changed"] = _auc(
+        [m for m in judged if m.case.kind == "identical_aisles" or not m.moments["lost"].any()],
+        "ratio",
+        against_changed=True,
+    ).as_json()
     out["calibration"] = calibration(judged)
     out["baselines"] = {name: _baseline(judged, name) for name in FIELD_THRESHOLDS}
     return out

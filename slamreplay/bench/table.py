@@ -20,6 +20,12 @@ _ROWS: tuple[tuple[str, tuple[str, ...], str, int], ...] = (
     ("changed, recall", ("changed", "recall"), "", 4),
     ("changed, F1 with the edges", ("changed_with_edges", "f1"), "", 4),
     ("AUC lost against changed", ("auc_lost_against_changed",), ">= 0.999", 4),
+    (
+        "AUC one identical aisle off against changed",
+        ("auc_identical_aisle_against_changed",),
+        ">= 0.99",
+        4,
+    ),
     ("hindsight error, median [m]", ("hindsight", "median_m"), "<= 0.03", 3),
     ("hindsight error, 95 % [m]", ("hindsight", "p95_m"), "<= 0.10", 3),
     ("hindsight off by over 0.5 m", ("hindsight", "over_half_m"), "", 4),

@@ -39,6 +39,9 @@ def verdict(
         list[str] | None,
         typer.Option("--condition", help="Only this condition; several by repeating it."),
     ] = None,
+    reports: Annotated[
+        bool, typer.Option("--reports", help="Write the report of every log judged wrongly.")
+    ] = False,
     at_least: Annotated[
         list[str] | None,
         typer.Option("--at-least", metavar="FIGURE=NUMBER", help="Exit with 1 where it is lower."),
@@ -80,6 +83,7 @@ def verdict(
             kinds=kind or (() if is_chosen else KINDS),
             conditions=condition or (() if is_chosen else tuple(CONDITIONS)),
             jobs=jobs,
+            reports=reports,
             progress=progress,
         )
     if as_json:
