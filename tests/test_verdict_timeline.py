@@ -90,10 +90,19 @@ def test_a_long_gap_between_scans_is_not_known():
     found = held(t, np.zeros(5, dtype=np.int8), 0, 14 * S, S)
 
     assert [(s.value, s.start_ns // S, s.end_ns // S) for s in found] == [
-        (GOOD, 0, 5),  # three usual spacings of a second
-        (UNKNOWN, 5, 12),
+        (GOOD, 0, 3),  # one usual spacing of a second after the last sample
+        (UNKNOWN, 3, 12),
         (GOOD, 12, 14),
     ]
+
+
+def test_a_gap_of_more_than_a_second_ends_an_interval_and_adds_nothing_to_it():
+    t = np.concatenate([np.arange(0, 24), np.arange(36, 80)]) * (S // 10)
+    flags = np.where((t >= S // 2) & (t < 5 * S), BAD, GOOD).astype(np.int8)
+    lost = settled(held(t, flags, 0, 8 * S, S), 3 * S, S)
+
+    assert [s.value for s in lost] == [GOOD, UNKNOWN, GOOD]  # 1.9 and 1.4 s are no three seconds
+    assert lost[0].end_ns == 24 * S // 10
 
 
 def test_every_pair_of_answers_has_its_state():

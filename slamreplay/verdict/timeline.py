@@ -37,8 +37,10 @@ def held(
 ) -> Timeline:
     """Flags (N,) at sorted times (N,), each held until the next sample, over [start_ns, end_ns).
 
-    A sample holds for no longer than `bridge_ns` or three usual spacings; then nothing is known.
-    The first one also holds that far backwards.
+    Where the next sample is farther away than `bridge_ns` and three usual spacings, a sample holds
+    for one usual spacing and then nothing is known: held longer, each gap would add to the time
+    that is lost, and one of a little over a second would be bridged. The first one also holds that
+    far backwards.
     """
     if end_ns <= start_ns:
         return ()
@@ -51,7 +53,7 @@ def held(
     if edges[0] - start_ns <= reach:
         parts = [Stretch(int(flags[0]), min(start_ns, edges[0]), edges[0])]
     for flag, (now, after) in zip(flags.tolist(), pairwise(edges), strict=True):
-        until = min(after, now + reach)
+        until = after if after - now <= reach else now + (usual or reach)
         parts += [Stretch(flag, now, until), Stretch(UNKNOWN, until, after)]
     return merged(Stretch(p.value, max(p.start_ns, start_ns), min(p.end_ns, end_ns)) for p in parts)
 
