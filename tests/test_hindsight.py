@@ -122,6 +122,19 @@ def test_robot_is_found_without_odometry():
     assert np.quantile(errors(found)[:, 0], 0.95) < 0.1
 
 
+def test_robot_is_found_without_odometry_on_both_sides_of_lost_scans():
+    view = synthetic_bundle(seconds=30.0).view()
+    tf, scans = view.table("transforms"), view.table("scans")
+    t_s = (scans.t_ns - scans.t_ns[0]) / NS_PER_S
+    view = view.with_table(view.table("odometry").take(np.arange(0)))
+    view = view.with_table(scans.take((t_s < 10.0) | (t_s > 15.0)))
+    found = hindsight(view.with_table(tf.take(tf["child_frame"] != "base_link")))
+
+    assert found is not None
+    assert found.coverage > 0.95
+    assert np.nanquantile(errors(found)[:, 0], 0.99) < 0.1
+
+
 def swept(view: BundleView, sweep_s: float) -> BundleView:
     """The same scans, taken while the robot drove on from beam to beam."""
     scans = view.table("scans")

@@ -1,5 +1,7 @@
 """The steps of hindsight by themselves: places, changes, evidence."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -8,6 +10,7 @@ from slamreplay.geometry import se2
 from slamreplay.hindsight.beams import HIT, INVALID, MISS, Beams, interleaved, side_by_side
 from slamreplay.hindsight.changes import find_changes
 from slamreplay.hindsight.keyframes import keyframes
+from slamreplay.hindsight.pipeline import motion_by_scans
 from slamreplay.hindsight.places import JUMP_DOUBTFUL, JUMP_SOLID, Hypotheses, best_places
 from slamreplay.maps.grid import OccupancyGrid
 from slamreplay.maps.raycast import cast_rays
@@ -137,19 +140,38 @@ def test_what_stands_on_unmapped_ground_is_unchanged():
     assert found.changed_share.max() == 0.0
 
 
+KNOWN = np.zeros(10, dtype=bool)
+
+
 def test_carried_robot_gets_keyframes_although_its_wheels_stand():
     near, far = hall().cells, with_box((20, 20), (120, 75))
     beams = beams_in([near] * 5 + [far] * 5)
 
-    assert keyframes(beams, np.zeros((10, 3))).tolist() == [0, 5]
+    assert keyframes(beams, np.zeros((10, 3)), KNOWN).tolist() == [0, 5]
 
 
 def test_motion_makes_keyframes():
     beams = beams_in([hall().cells] * 10)
     odometry = np.column_stack([np.arange(10) * 0.1, np.zeros(10), np.zeros(10)])
 
-    assert keyframes(beams, odometry).tolist() == [0, 3, 6, 9]
-    assert keyframes(beams, se2.compose(odometry, np.zeros(3)) * 0.0).tolist() == [0]
+    assert keyframes(beams, odometry, KNOWN).tolist() == [0, 3, 6, 9]
+    assert keyframes(beams, odometry * 0.0, KNOWN).tolist() == [0]
+
+
+def test_unknown_motion_has_a_keyframe_on_either_side():
+    beams = beams_in([hall().cells] * 10)
+
+    assert keyframes(beams, np.zeros((10, 3)), np.arange(10) == 6).tolist() == [0, 5, 6]
+
+
+def test_without_odometry_a_gap_in_the_scans_is_a_break():
+    beams = beams_in([hall().cells] * 6)
+    beams = replace(beams, t_ns=np.array([0, 1, 2, 40, 41, 42]) * 100_000_000)
+
+    track, is_unknown = motion_by_scans("base", beams)
+
+    assert is_unknown.tolist() == [False, False, False, True, False, False]
+    assert np.abs(track.xyyaw).max() < 0.02
 
 
 def laser(t_s: list[float], x: float, ends: list[tuple[float, float]]) -> Beams:

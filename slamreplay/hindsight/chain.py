@@ -22,6 +22,8 @@ GOOD, POOR = 0.6, 0.35
 GAIN = 0.08
 #: Within this scan and odometry agree on the motion between two keyframes.
 AGREE_M, AGREE_RAD = 0.15, 0.2
+#: A speed is carried on over at most this many times the time it was seen in.
+MOST_LONGER = 10.0
 NARROW = Window(0.3, 0.1, np.radians(12.0), np.radians(2.0), pull=0.03)
 CLOSE = Window(0.05, 0.05, np.radians(1.0), np.radians(1.0), pull=0.0)
 WIDE = Window(1.2, 0.1, np.radians(20.0), np.radians(2.0), pull=0.03)
@@ -47,13 +49,21 @@ class Chain:
     information: se2.Array
 
 
-def scan_matched(points: Sequence[se2.Array], odometry: se2.Array | None) -> Chain:
+def scan_matched(
+    points: Sequence[se2.Array],
+    odometry: se2.Array | None,
+    t_ns: NDArray[np.int64],
+    is_unknown: NDArray[np.bool_],
+) -> Chain:
     """Match each scan against a local map of the scans before it.
 
     Args:
         points: K arrays (M, 2), ends of the beams in the base frame.
-        odometry: (K, 3) poses in the odom frame, or None: then each motion is expected to be the
-            one before, and scans that hardly moved do not enter the local map.
+        odometry: (K, 3) poses in the odom frame, or None: then the speed is expected to be the one
+            before, and scans that hardly moved do not enter the local map.
+        t_ns: (K,) their times, ascending.
+        is_unknown: (K,) nothing tells the motion from the scan before: a break, not to be matched
+            over, for where walls look alike a match would be found in the wrong one.
     """
     n = len(points)
     xyyaw, score = np.zeros((n, 3)), np.ones(n)
@@ -61,13 +71,14 @@ def scan_matched(points: Sequence[se2.Array], odometry: se2.Array | None) -> Cha
     memory: list[tuple[int, se2.Array]] = []
     for k in range(n):
         scan = thin(points[k], 0.1)
-        if k and memory:
+        if k and is_unknown[k]:
+            xyyaw[k], score[k], is_break[k] = xyyaw[k - 1], 0.0, True
+        elif k and memory:
             last = xyyaw[k - 1]
             if odometry is not None:
                 guess = se2.compose(last, se2.between(odometry[k - 1], odometry[k]))
             else:
-                motion = se2.between(xyyaw[k - 2], last) if k > 1 else np.zeros(3)
-                guess = se2.compose(last, motion)
+                guess = se2.compose(last, _expected(xyyaw, t_ns, is_break, k))
             laid = _lay(memory, xyyaw, scan, guess, last)
             score[k], information[k] = laid.score, laid.information
             is_break[k] = laid.score < POOR
@@ -85,6 +96,16 @@ def scan_matched(points: Sequence[se2.Array], odometry: se2.Array | None) -> Cha
         )
         is_solid[1:] &= (np.hypot(off[:, 0], off[:, 1]) < AGREE_M) & (np.abs(off[:, 2]) < AGREE_RAD)
     return Chain(xyyaw, score, is_break, is_solid, information)
+
+
+def _expected(
+    xyyaw: se2.Array, t_ns: NDArray[np.int64], is_break: NDArray[np.bool_], k: int
+) -> se2.Array:
+    """(3,) motion to scan k at the speed of the motion before; none where that is not known."""
+    if k < 2 or is_break[k - 1]:
+        return np.zeros(3)
+    longer = (t_ns[k] - t_ns[k - 1]) / max(t_ns[k - 1] - t_ns[k - 2], 1)
+    return np.asarray(min(longer, MOST_LONGER) * se2.between(xyyaw[k - 2], xyyaw[k - 1]))
 
 
 def _lay(

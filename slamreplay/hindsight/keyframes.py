@@ -15,19 +15,28 @@ NEW_SHARE, NEW_M = 0.4, 0.3
 MIN_POINTS = 10
 
 
-def keyframes(beams: Beams, odometry: se2.Array) -> NDArray[np.int64]:
+def keyframes(
+    beams: Beams, odometry: se2.Array, is_unknown: NDArray[np.bool_]
+) -> NDArray[np.int64]:
     """Indices of the keyframes among the scans.
 
     Args:
         beams: the scans.
         odometry: (N, 3) pose in the odom frame at each scan.
+        is_unknown: (N,) scans to which the motion from the one before is not known; a keyframe
+            stands on either side, so that no scan in between is carried over.
     """
     reach = np.hypot(*np.moveaxis(beams.ends - beams.laser_xy.astype(np.float32), -1, 0))
     hit = beams.kind == HIT
     enough = hit.sum(axis=1) >= MIN_POINTS
+    usable = np.flatnonzero(enough)
+    part = np.cumsum(is_unknown)[usable]
+    at_edge = np.zeros(len(beams), dtype=bool)
+    at_edge[usable[1:][part[1:] > part[:-1]]] = True
+    at_edge[usable[:-1][part[1:] > part[:-1]]] = True
     chosen: list[int] = []
-    for scan in np.flatnonzero(enough).tolist():
-        if chosen:
+    for scan in usable.tolist():
+        if chosen and not at_edge[scan]:
             last = chosen[-1]
             dx, dy = odometry[scan, :2] - odometry[last, :2]
             turn = abs(float(se2.wrap_angle(odometry[scan, 2] - odometry[last, 2])))

@@ -39,6 +39,8 @@ from slamreplay.matching.field import ScoreField, WorkingMap, working_map
 from slamreplay.matching.whole_map import search_space
 
 SIGMA_M = 0.12
+#: Without odometry nothing tells how a robot moved while it saw nothing for longer than this.
+UNSEEN_NS = 1_000_000_000
 #: A second laser that the map explains this much worse than the first is left out.
 MISFIT = 0.8
 
@@ -75,18 +77,21 @@ def _rebuilt(
 ) -> Hindsight | None:
     """Hindsight from these lasers; None where the map explains the second far worse."""
     say("keyframes", 0.0)
-    motion = lasers[0].odometry
+    motion, is_unknown = lasers[0].odometry, np.zeros(len(lasers[0].t_ns), dtype=bool)
     if motion is None or not motion.has_pose.any():
-        motion = motion_by_scans(base, _beside([beams_of(laser, None) for laser in lasers], None))
+        still = _beside([beams_of(laser, None) for laser in lasers], None)
+        motion, is_unknown = motion_by_scans(base, still)
     each = [beams_of(laser, motion) for laser in lasers]
     beams = _beside(each, motion)
     odometry = odometry_at(motion, beams.t_ns)
-    keys = keyframes(beams, odometry)
+    keys = keyframes(beams, odometry, is_unknown)
     if not len(keys):
         return _nowhere(grid.frame_id, base, beams)
     points = [beams.points(k) for k in keys]
     say("scan matching", 0.05)
-    chain = scan_matched(points, odometry[keys])
+    parts = np.cumsum(is_unknown)[keys]
+    over_unknown = np.append(False, parts[1:] > parts[:-1])
+    chain = scan_matched(points, odometry[keys], beams.t_ns[keys], over_unknown)
     found = submaps(chain, points, beams.laser_xy)
     if not found:
         return _nowhere(grid.frame_id, base, beams)
@@ -168,10 +173,18 @@ def odometry_at(motion: PoseTrack, t_ns: NDArray[np.int64]) -> se2.Array:
     return np.asarray(poses[known[np.maximum(before, 0)]])
 
 
-def motion_by_scans(base: str, beams: Beams) -> PoseTrack:
-    """What stands in for odometry where a log has none: each scan matched to those before it."""
-    xyyaw = scan_matched([beams.points(k) for k in range(len(beams))], None).xyyaw
-    return PoseTrack.without_covariance("odom", base, beams.t_ns, xyyaw)
+def motion_by_scans(base: str, beams: Beams) -> tuple[PoseTrack, NDArray[np.bool_]]:
+    """What stands in for odometry where a log has none: each scan matched to those before it.
+
+    Returns:
+        The track, and for each scan (N,) whether the motion to it is not known: too long after the
+        one before, or like nothing before it.
+    """
+    late = np.append(False, np.diff(beams.t_ns) > UNSEEN_NS)
+    points = [beams.points(k) for k in range(len(beams))]
+    chain = scan_matched(points, None, beams.t_ns, late)
+    track = PoseTrack.without_covariance("odom", base, beams.t_ns, chain.xyyaw)
+    return track, chain.is_break
 
 
 def _beside(each: list[Beams], motion: PoseTrack | None) -> Beams:
