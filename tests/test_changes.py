@@ -52,8 +52,11 @@ def put(cells: np.ndarray, low: tuple[float, float], high: tuple[float, float]) 
     return cells
 
 
-def find(phases, poses=(POSE,), rate_hz=10.0):
-    """Changes in a log of (start in s, end in s, cells) phases, from each of the poses in turn."""
+def find(phases, poses=(POSE,), rate_hz=10.0, lost=lambda ranges: ~np.isfinite(ranges)):
+    """Changes in a log of (start in s, end in s, cells) phases, from each of the poses in turn.
+
+    `lost` says of ranges (N, B) which of them give nothing back.
+    """
     t_ns, rows, at = [], [], []
     for start_s, end_s, cells in phases:
         world = OccupancyGrid(np.where(cells < 0, 100, cells), 0.05, np.zeros(3))
@@ -64,7 +67,7 @@ def find(phases, poses=(POSE,), rate_hz=10.0):
         rows += [reach[k] for k in turn]
         at += [poses[k] for k in turn]
     ranges = np.array(rows)
-    kind = np.where(np.isfinite(ranges), HIT, MISS).astype(np.int8)
+    kind = np.where(lost(ranges), MISS, HIT).astype(np.int8)
     ranges = np.where(kind == HIT, ranges, 12.0)
     ends = np.stack([ranges * np.cos(BEARINGS), ranges * np.sin(BEARINGS)], axis=-1)
     beams = Beams(np.array(t_ns), ends.astype(np.float32), kind, np.zeros(2))
@@ -109,6 +112,23 @@ def test_rack_taken_down_elsewhere_is_gone_from_then_on():
     assert min(r.first_seen_ns for r in found.regions) == 60 * S
     assert found.removed_share[:80].max() == 0.0
     assert found.removed_share[80:].min() > 0.05
+
+
+def test_rack_gone_beside_the_robot_is_told_by_a_lidar_that_sees_as_far_elsewhere():
+    found = find([(0, 10, without_rack())], lost=lambda ranges: ranges > 5.9)
+
+    assert {r.kind for r in found.regions} == {"removed"}
+    assert found.removed_share.min() > 0.05
+
+
+def test_glass_that_swallows_light_is_not_gone():
+    window = (BEARINGS > 1.0) & (BEARINGS < 1.3)
+    flicker = np.random.default_rng(3).random((100, len(BEARINGS))) < 0.05
+
+    found = find([(0, 10, hall().cells)], lost=lambda _: window | flicker)
+
+    assert found.regions == ()
+    assert found.changed_share.max() == 0.0
 
 
 @pytest.mark.parametrize("stands_s", [5.0, 12.0])

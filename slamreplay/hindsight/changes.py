@@ -19,7 +19,7 @@ from slamreplay.hindsight.changed_beams import BEYOND, BEYOND_M, NEARER, SILENT,
 from slamreplay.hindsight.evidence import BIN_S, Lattice, lattice, passes
 from slamreplay.hindsight.freshness import freshness_of
 from slamreplay.hindsight.gone import GONE_S, Gone, gone
-from slamreplay.hindsight.reach import proven_reach_m
+from slamreplay.hindsight.reach import is_lossy, proven_reach_m
 from slamreplay.hindsight.regions import Contradictions, changed_regions
 from slamreplay.hindsight.standing import asked_cells, standing
 from slamreplay.maps.grid import OccupancyGrid
@@ -44,6 +44,9 @@ def find_changes(
     laid.says[blind] = SILENT
     laid.says[_near_a_wall(working, laid)] = SILENT
     where = lattice(working, beams.t_ns)
+    if is_lossy(where, beams, laid):
+        laid.is_sure[beams.kind == MISS] = False
+        reach_m = 0.0
     slots, count = asked_cells(where, laid)
     passed = passes(where, beams, poses, reach_m, slots, count)
     new = standing(where, laid, slots, passed.through)
