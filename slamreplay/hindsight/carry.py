@@ -10,6 +10,7 @@ from slamreplay.geometry import se2
 from slamreplay.hindsight.beams import HIT, Beams
 from slamreplay.hindsight.keyframes import MIN_POINTS
 from slamreplay.hindsight.smoothing import MIN_SCORE, match_covariance
+from slamreplay.hindsight.way import between_keyframes
 from slamreplay.matching.correlative import Window, match
 from slamreplay.matching.field import ScoreField
 from slamreplay.matching.thinning import thin
@@ -42,27 +43,18 @@ def carry(
         beams: the scans.
         field: score field of the map, to choose sides.
     """
-    t_ns = beams.t_ns
-    scan = np.arange(len(t_ns))
-    before = np.clip(np.searchsorted(keys, scan, side="right") - 1, 0, len(keys) - 1)
-    after = np.minimum(before + 1, len(keys) - 1)
-    after[scan < keys[0]] = 0
-    ahead = se2.compose(poses[before], se2.between(odometry[keys[before]], odometry))
-    back = se2.compose(poses[after], se2.between(odometry[keys[after]], odometry))
-    span = np.maximum(t_ns[keys[after]] - t_ns[keys[before]], 1)
-    part = np.clip((t_ns - t_ns[keys[before]]) / span, 0.0, 1.0)[:, None]
-    missing = se2.between(ahead, back)
-    carried = se2.compose(ahead, part * missing)
-    share = np.where(part[:, 0] > 0.5, after, before)
-    over = np.zeros(len(t_ns), dtype=bool)
+    way = between_keyframes(beams.t_ns, odometry, keys, poses)
+    carried, before, after = way.xyyaw, way.before, way.after
+    share = np.where(way.part > 0.5, after, before)
+    over = np.zeros(len(odometry), dtype=bool)
     if len(is_open):
         over = is_open[np.minimum(before, len(is_open) - 1)] & (after > before)
     if over.any():
-        later = scan_scores(field, beams, back) > scan_scores(field, beams, ahead)
-        carried[over] = np.where(later[:, None], back, ahead)[over]
+        later = scan_scores(field, beams, way.back) > scan_scores(field, beams, way.ahead)
+        carried[over] = np.where(later[:, None], way.back, way.ahead)[over]
         share[over] = np.where(later, after, before)[over]
     carried[keys], share[keys] = poses, np.arange(len(keys))
-    doubt = np.minimum(part, 1.0 - part) * np.abs(missing)
+    doubt = np.minimum(way.part, 1.0 - way.part)[:, None] * np.abs(way.missing)
     doubt[:, :2] = np.hypot(doubt[:, 0], doubt[:, 1])[:, None]
     doubt[over] = 0.0
     return carried, share, doubt

@@ -21,6 +21,7 @@ from slamreplay.hindsight.beams import Beams, beams_of, interleaved, side_by_sid
 from slamreplay.hindsight.carry import carry, scan_scores, settle
 from slamreplay.hindsight.chain import Chain, scan_matched
 from slamreplay.hindsight.changes import find_changes
+from slamreplay.hindsight.deskew import longest_sweep_s, motion_as_matched
 from slamreplay.hindsight.keyframes import keyframes
 from slamreplay.hindsight.places import (
     JUMP_BROKEN,
@@ -92,6 +93,11 @@ def _rebuilt(
     parts = np.cumsum(is_unknown)[keys]
     over_unknown = np.append(False, parts[1:] > parts[:-1])
     chain = scan_matched(points, odometry[keys], beams.t_ns[keys], over_unknown)
+    matched = motion_as_matched(base, beams.t_ns, odometry, keys, chain, longest_sweep_s(lasers))
+    if matched is not None:
+        motion, each = matched, [beams_of(laser, matched) for laser in lasers]
+        beams = _beside(each, motion)
+        points = [beams.points(k) for k in keys]
     found = submaps(chain, points, beams.laser_xy)
     if not found:
         return _nowhere(grid.frame_id, base, beams)
