@@ -122,6 +122,24 @@ DECODER_LINES = {
         {**PLACED, "child_frame_id": "tag_7", "covariance": COV36},
         T,
     ),
+    "sensor_msgs/msg/NavSatFix": (
+        {
+            "header": HEADER,
+            "status": {"status": 0, "service": 1},
+            "latitude": 0.0,
+            "longitude": 0.0,
+            "altitude": 3.0,
+            "position_covariance": COV9,
+            "position_covariance_type": 0,
+        },
+        {
+            "position_xyz": [6378140, 0, 0],
+            "frame_id": "earth",
+            "child_frame_id": "f",
+            "kind": "gnss",
+        },
+        T,
+    ),
     "tf2_msgs/msg/TFMessage": ({"transforms": [TF]}, EDGE, T),
     "tf/msg/tfMessage": ({"transforms": [TF]}, EDGE, T),
     "nav_msgs/msg/OccupancyGrid": (

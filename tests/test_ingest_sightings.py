@@ -1,8 +1,9 @@
-"""What the robot sensed of tags and docks is a measurement; a satellite fix needs a datum."""
+"""What the robot sensed of tags and docks is a measurement; a satellite fix is one in metres."""
 
 import numpy as np
 import pytest
 
+from slamreplay.geometry.geodesy import earth_from_geodetic
 from slamreplay.ingest.pipeline import ingest
 from slamreplay.ingest.sightings import is_tag_frame
 
@@ -65,12 +66,36 @@ def test_sensed_docks_are_measurements_and_staging_poses_are_not(bundle):
     assert "/staging_pose" in {x.what for x in bundle.manifest.losses}
 
 
-def test_gnss_is_neither_odometry_nor_belief_and_a_fix_is_counted(bundle):
+def test_gnss_is_neither_odometry_nor_belief_and_a_fix_is_a_measurement(bundle):
     roles = {r.role: r.topic for r in bundle.manifest.roles}
     assert roles["odometry"] == "/odom"
     assert "/odometry/gps" not in roles.values()
-    (fix,) = [x for x in bundle.manifest.losses if x.what.startswith("/fix")]
-    assert (fix.count, "no datum" in fix.reason) == (9, True)
+    rows = bundle.view().table("references")
+    rows = rows.take(rows["kind"] == "gnss")
+    assert (len(rows), set(rows["frame_id"]), set(rows["child_frame_id"])) == (9, {"earth"}, {""})
+    np.testing.assert_allclose(rows["position_xyz"][0], [6_378_137.0, 0.0, 0.0])
+
+
+def test_fixes_are_metres_and_their_covariance_is_turned_with_them(logs, tmp_path):
+    values = {"latitude": 60.0, "longitude": 90.0, "altitude": 100.0, "position_covariance_type": 2,
+              "position_covariance": np.diag([1.0, 4.0, 9.0]).ravel()}  # fmt: skip
+    bad = {"latitude": np.nan}
+    none = {"status__status": -1}
+    rows = [stamped(logs, FIX, k, **v) for k, v in enumerate((values, bad, none, values))]
+    odometry = stamped(logs, ODOM, 0, header__frame_id="odom", pose__pose__orientation__w=1.0)
+    messages = [("/odom", ODOM, odometry, 10**18)]
+    messages += [("/fix", FIX, m, 10**18 + k) for k, m in enumerate(rows)]
+    log = logs.write("f.mcap", messages)
+    bundle = ingest([log], tmp_path / "b")
+    found = bundle.view().table("references")
+
+    assert len(found) == 2
+    np.testing.assert_allclose(found["position_xyz"][0], earth_from_geodetic([60, 90, 100]))
+    cov = found["covariance"][0].reshape(6, 6)[:3, :3]
+    np.testing.assert_allclose(cov[0, 0], 1.0)  # at 90 degrees east, east is -x
+    np.testing.assert_allclose(np.linalg.eigvalsh(cov), [1.0, 4.0, 9.0])
+    reasons = {x.reason for x in bundle.manifest.losses if x.what == "/fix"}
+    assert reasons == {"latitude or longitude is none", "the receiver had no fix"}
 
 
 @pytest.mark.parametrize(

@@ -36,6 +36,7 @@ DECODERS = Registry(
         "nav2_msgs/msg/BehaviorTreeLog": f"{_HERE}.behavior_tree:BEHAVIOR_TREE_LOG",
         "fiducial_msgs/msg/FiducialTransformArray": f"{_HERE}.fiducials:FIDUCIAL_TRANSFORMS",
         "apriltag_ros/msg/AprilTagDetectionArray": f"{_HERE}.fiducials:APRILTAG_DETECTIONS",
+        "sensor_msgs/msg/NavSatFix": f"{_HERE}.nav_sat_fix:NAV_SAT_FIX",
         "move_base_msgs/msg/RecoveryStatus": f"{_HERE}.recovery_status:RECOVERY_STATUS",
         "diagnostic_msgs/msg/DiagnosticArray": f"{_HERE}.health:DIAGNOSTICS",
         "rcl_interfaces/msg/Log": f"{_HERE}.health:LOG",

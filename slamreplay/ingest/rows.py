@@ -19,11 +19,6 @@ from slamreplay.ingest.decoders.decoder import Decoder, Messages
 from slamreplay.ingest.readers.reader import Connection, Reader
 from slamreplay.ingest.types import deserialiser
 
-#: Types that are known, and why nothing can be made of them.
-_UNUSABLE = {
-    "sensor_msgs/msg/NavSatFix": "no datum ties latitude and longitude to the map: "
-    "record what a node made of it in the map frame, or give it with --reference",
-}
 #: Payload bytes of one topic that are held before they are decoded.
 _BATCH_BYTES = 32_000_000
 
@@ -116,7 +111,7 @@ def _batches(
     for connection in reader.connections:
         reason = skip(connection.topic)
         if reason is None and connection.type not in DECODERS:
-            reason = _UNUSABLE.get(connection.type, "no decoder for this type")
+            reason = "no decoder for this type"
         if reason is None and connection.count == 0:
             continue
         if reason is None:
