@@ -81,7 +81,10 @@ def scan_matched(
                 guess = se2.compose(last, _expected(xyyaw, t_ns, is_break, k))
             laid = _lay(memory, xyyaw, scan, guess, last)
             score[k], information[k] = laid.score, laid.information
-            is_break[k] = laid.score < POOR
+            # A poor match that contradicts odometry as well has no witness at all.
+            poor = laid.score < POOR
+            poor |= odometry is not None and laid.score < GOOD and not _agree(guess, laid.xyyaw)
+            is_break[k] = poor
             xyyaw[k] = guess if is_break[k] else laid.xyyaw
         if is_break[k]:
             memory = []
@@ -91,10 +94,8 @@ def scan_matched(
             memory = [*memory[1 - MEMORY :], (k, scan)]
     is_solid = (score >= GOOD) & ~is_break
     if odometry is not None:
-        off = se2.between(
-            se2.between(odometry[:-1], odometry[1:]), se2.between(xyyaw[:-1], xyyaw[1:])
-        )
-        is_solid[1:] &= (np.hypot(off[:, 0], off[:, 1]) < AGREE_M) & (np.abs(off[:, 2]) < AGREE_RAD)
+        counted = se2.between(odometry[:-1], odometry[1:])
+        is_solid[1:] &= _agree(counted, se2.between(xyyaw[:-1], xyyaw[1:]))
     return Chain(xyyaw, score, is_break, is_solid, information)
 
 
@@ -106,6 +107,13 @@ def _expected(
         return np.zeros(3)
     longer = (t_ns[k] - t_ns[k - 1]) / max(t_ns[k - 1] - t_ns[k - 2], 1)
     return np.asarray(min(longer, MOST_LONGER) * se2.between(xyyaw[k - 2], xyyaw[k - 1]))
+
+
+def _agree(a: se2.Array, b: se2.Array) -> NDArray[np.bool_]:
+    """Which poses (..., 3) of two sets are about the same."""
+    off = se2.between(a, b)
+    near = np.hypot(off[..., 0], off[..., 1]) < AGREE_M
+    return np.asarray(near & (np.abs(off[..., 2]) < AGREE_RAD))
 
 
 def _lay(
