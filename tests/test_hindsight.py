@@ -5,9 +5,11 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from slamreplay.bundle.manifest import Role
 from slamreplay.bundle.products import Hindsight
-from slamreplay.bundle.tables import Ragged
-from slamreplay.bundle.view import BundleView
+from slamreplay.bundle.schema import TABLES
+from slamreplay.bundle.tables import Ragged, Table
+from slamreplay.bundle.view import Bundle, BundleView
 from slamreplay.geometry import se2, se3
 from slamreplay.geometry.times import NS_PER_S
 from slamreplay.hindsight.pipeline import hindsight
@@ -251,3 +253,24 @@ def test_jarvis_is_found_to_some_centimetres(real_logs, tmp_path):
     turn = np.arctan2(cross[0, 1] - cross[1, 0], cross[0, 0] + cross[1, 1])
     off = se2.transform_points(np.array([0.0, 0.0, turn]), a) - b
     assert np.median(np.hypot(*off.T)) < 0.05
+
+
+def test_a_second_laser_that_sees_another_world_does_not_hide_the_first():
+    """A scanner near the floor among feet and pallets that move with the robot's every step."""
+    bundle = synthetic_bundle(seconds=15.0)
+    scans = bundle.table("scans")
+    rng = np.random.Generator(np.random.PCG64(4))
+    ranges = scans["ranges_m"]
+    clutter = Ragged(rng.uniform(0.3, 6.0, len(ranges.values)).astype(np.float32), ranges.offsets)
+    low = scans.replace(ranges_m=clutter, topic=np.full(len(scans), "/low", dtype=object))
+    both = Table.concat(TABLES["scans"], [scans, low]).sorted_by_time()
+    role = Role(role="scan_2", topic="/low", type="", messages=len(low), reason="")
+    manifest = bundle.manifest.model_copy(update={"roles": [*bundle.manifest.roles, role]})
+    tables = {**{name: bundle.table(name) for name in TABLES}, "scans": both}
+    found = hindsight(
+        Bundle(manifest, tables, {bundle.manifest.maps[-1].version: bundle.grid()}).view()
+    )
+
+    assert found is not None
+    assert found.coverage > 0.99
+    assert np.percentile(errors(found)[:, 0], 95) < 0.08

@@ -44,6 +44,8 @@ SIGMA_M = 0.12
 UNSEEN_NS = 1_000_000_000
 #: A second laser that the map explains this much worse than the first is left out.
 MISFIT = 0.8
+#: Where two lasers together place less of the scans than this, the first one is asked alone.
+_BOTH_KNOW = 0.5
 
 Progress = Callable[[str, float], None]
 
@@ -66,7 +68,10 @@ def hindsight(view: BundleView, *, progress: Progress | None = None) -> Hindsigh
         return None
     base = view.manifest.frames.base or "base_link"
     whole = _rebuilt(base, grid, working, lasers, say)
-    return whole or _rebuilt(base, grid, working, lasers[:1], say)
+    if whole is not None and (len(lasers) == 1 or whole.coverage >= _BOTH_KNOW):
+        return whole
+    alone = _rebuilt(base, grid, working, lasers[:1], say)
+    return alone if whole is None or (alone and alone.coverage > whole.coverage) else whole
 
 
 def _rebuilt(
