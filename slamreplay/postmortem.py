@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,7 @@ from slamreplay.consistency import CHECKS
 from slamreplay.consistency.context import CheckContext
 from slamreplay.consistency.credibility import nees_of_belief
 from slamreplay.consistency.references import best_reference, unused_references
+from slamreplay.consistency.sensed import sensed_references
 from slamreplay.hindsight.pipeline import hindsight
 from slamreplay.replay.metrics import trial_metrics
 from slamreplay.report.evidence import Postmortem, TrialResult
@@ -34,6 +35,7 @@ def postmortem(
     runs: Sequence[Run] = (),
     *,
     limits: Limits | None = None,
+    hold_out: Collection[str] = (),
     progress: Callable[[str, float], None] | None = None,
 ) -> Postmortem:
     """Look back on one log.
@@ -45,11 +47,13 @@ def postmortem(
         bundle: the log.
         runs: trials on the same bundle, to be laid beside each other.
         limits: thresholds of the verdict; the defaults are design's.
+        hold_out: kinds of sensed references (fiducial, dock, gnss) that judge hindsight instead of
+            joining it.
         progress: told what is being done, and the share done from 0 to 1.
     """
     limits = Limits() if limits is None else limits
     say = progress or (lambda _what, _share: None)
-    view = bundle.view()
+    view = bundle.view(hold_out)
     found = hindsight(view, progress=lambda what, share: say(what, _HINDSIGHT_SHARE * share))
     say("verdict", _HINDSIGHT_SHARE)
     belief = recorded_belief(view, belief_times(view))
@@ -59,6 +63,7 @@ def postmortem(
     reference, kind = (None, None) if best is None else best
     context = CheckContext(belief, reference, kind, view)
     findings = [*judgement.findings, *unused_references(bundle)]
+    findings += sensed_references(bundle, found, hold_out)
     for name in CHECKS:
         findings += CHECKS.load(name)(context)
     track = None if found is None else found.track

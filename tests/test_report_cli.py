@@ -136,3 +136,10 @@ def test_commands_import_nothing_heavy():
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
 
     assert not heavy & set(done.stdout.split())
+
+
+def test_what_cannot_be_held_out_is_named(app, bundle_folder, tmp_path):
+    result = run(app, "report", bundle_folder, "-o", tmp_path / "r", "--hold-out", "survey")
+
+    assert isinstance(result.exception, UsageError)
+    assert "survey" in str(result.exception)

@@ -126,6 +126,22 @@ FINDINGS: dict[str, Explanation] = {
         "samples (n over the integrated autocorrelation time of the NEES series).",
         "Undecided is neither consistent nor inconsistent.",
     ),
+    "SR-REF-001": Explanation(
+        "What the robot sensed joined hindsight",
+        "Which tags, docks and satellite fixes are part of the rebuilt trajectory?",
+        "Sightings of things that stand still and positions of the antenna, with robust noise in "
+        "the pose graph; places that nobody surveyed are estimated with the trajectory. --hold-out "
+        "KIND keeps a kind out, so that it judges instead.",
+        "A tag on something that moves, or two tags of one number: both are given up where the "
+        "scans say otherwise.",
+    ),
+    "SR-REF-002": Explanation(
+        "What was held out judges hindsight",
+        "How far are sightings and fixes that hindsight did not use from where it puts them?",
+        "Each sighting carried by hindsight's pose, against the thing's surveyed place or else "
+        "their median; satellite fixes after one rigid alignment.",
+        "It holds the sensor's own noise and the error of where it is mounted as well.",
+    ),
     "SR-CLK-001": Explanation(
         "Clocks disagree",
         "Do header stamps and log times tell the same story?",

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
 from typing import Literal
 
 import numpy as np
@@ -73,6 +75,7 @@ class Hindsight:
         margin: by how much the best sequence of places beats the best different one, in mean score
             per scan; None where no different one was found.
         changes: what contradicts the map, seen from this trajectory.
+        joined: sightings and fixes that it was made of beside scans and odometry, by kind.
     """
 
     track: PoseTrack
@@ -81,3 +84,4 @@ class Hindsight:
     match: se2.Array
     margin: float | None
     changes: Changes | None
+    joined: Mapping[str, int] = field(default_factory=lambda: MappingProxyType({}))

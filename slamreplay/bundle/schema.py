@@ -234,3 +234,5 @@ TABLES: dict[str, TableSchema] = {schema.name: schema for schema in _SCHEMAS}
 
 #: References of these kinds only judge: no estimator, hindsight, perturbation or verdict sees them.
 JUDGING_KINDS = frozenset({"simulation", "motion_capture", "survey"})
+#: References of these kinds the robot sensed itself: they join hindsight unless they are held out.
+SENSED_KINDS = frozenset({"gnss", "fiducial", "dock"})

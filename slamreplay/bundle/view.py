@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -11,9 +11,10 @@ from types import MappingProxyType
 import numpy as np
 
 from slamreplay.bundle.manifest import Manifest
-from slamreplay.bundle.schema import JUDGING_KINDS, TABLES
+from slamreplay.bundle.schema import JUDGING_KINDS, SENSED_KINDS, TABLES
 from slamreplay.bundle.store import read_grid, read_manifest, read_table
 from slamreplay.bundle.tables import Table
+from slamreplay.errors import UsageError
 from slamreplay.geometry.transforms import Edge, TransformBuffer
 from slamreplay.maps.grid import OccupancyGrid
 
@@ -69,9 +70,17 @@ class Bundle:
             self._grids[entry.version] = read_grid(self.path, entry)
         return self._grids[entry.version]
 
-    def view(self) -> BundleView:
-        """The evidence as it was recorded."""
-        return BundleView(self)
+    def view(self, hold_out: Collection[str] = ()) -> BundleView:
+        """The evidence as it was recorded, without references of the kinds that are held out.
+
+        Raises:
+            UsageError: a kind that only judges anyway, or none at all.
+        """
+        for kind in hold_out:
+            if kind not in SENSED_KINDS:
+                known = ", ".join(sorted(SENSED_KINDS))
+                raise UsageError(f"'{kind}' cannot be held out", hint=f"there are: {known}")
+        return BundleView(self, held_out=frozenset(hold_out))
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,12 +92,14 @@ class BundleView:
         tables: tables a perturbation has exchanged.
         replaced_grid: a map a perturbation has exchanged.
         settings: estimator settings a perturbation has changed, by name.
+        held_out: kinds of references that are left out beside those that only judge.
     """
 
     bundle: Bundle
     tables: Mapping[str, Table] = field(default_factory=lambda: MappingProxyType({}))
     replaced_grid: OccupancyGrid | None = None
     settings: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
+    held_out: frozenset[str] = frozenset()
 
     @property
     def manifest(self) -> Manifest:
@@ -101,7 +112,9 @@ class BundleView:
             return self.tables[name]
         table = self.bundle.table(name)
         if name == "references":
-            return table.take(~np.isin(table["kind"].astype(str), sorted(JUDGING_KINDS)))
+            return table.take(
+                ~np.isin(table["kind"].astype(str), sorted(JUDGING_KINDS | self.held_out))
+            )
         return table
 
     def role(self, role: str) -> Table | None:

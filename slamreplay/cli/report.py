@@ -57,6 +57,15 @@ UpdateMap = Annotated[
     ),
 ]
 
+HoldOut = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--hold-out",
+        metavar="KIND",
+        help="Keep fiducial, dock or gnss out of hindsight, so that it can judge it.",
+    ),
+]
+
 
 def register(app: typer.Typer) -> None:
     """Add the command."""
@@ -75,6 +84,7 @@ def _report(
     start_s: Start = None,
     end_s: End = None,
     update_map: UpdateMap = None,
+    hold_out: HoldOut = None,
     fail_on: FailOn = None,
     as_json: Json = False,
 ) -> None:
@@ -101,7 +111,7 @@ def _report(
         from slamreplay.report.writer import write_report
 
         with progress_bar("looking back") as progress:
-            post = postmortem(bundle, runs, progress=progress)
+            post = postmortem(bundle, runs, hold_out=hold_out or (), progress=progress)
             page = write_report(post, output)
         if update_map is not None:
             _propose(post, update_map, map_yaml)

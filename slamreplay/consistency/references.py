@@ -8,6 +8,7 @@ import numpy as np
 
 from slamreplay.bundle.findings import Finding
 from slamreplay.bundle.products import Hindsight
+from slamreplay.bundle.schema import SENSED_KINDS
 from slamreplay.bundle.tables import Table
 from slamreplay.bundle.track import PoseTrack
 from slamreplay.bundle.view import Bundle
@@ -44,7 +45,7 @@ def best_reference(bundle: Bundle, hindsight: Hindsight | None) -> tuple[PoseTra
 
 
 def unused_references(bundle: Bundle) -> tuple[Finding, ...]:
-    """One finding for each reference in the log that cannot be held against the belief."""
+    """One finding for each judging reference in the log that cannot be held against the belief."""
     return tuple(
         Finding(
             "SR-CON-003",
@@ -55,7 +56,7 @@ def unused_references(bundle: Bundle) -> tuple[Finding, ...]:
             n=len(c.track),
         )
         for c in candidates(bundle)
-        if c.refusal is not None
+        if c.refusal is not None and c.kind not in SENSED_KINDS
     )
 
 

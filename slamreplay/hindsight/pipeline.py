@@ -27,14 +27,15 @@ from slamreplay.hindsight.places import (
     JUMP_BROKEN,
     JUMP_DOUBTFUL,
     JUMP_SOLID,
-    best_places,
 )
 from slamreplay.hindsight.reseating import reseated
 from slamreplay.hindsight.search import hypotheses_of
 from slamreplay.hindsight.seating import seat_keyframes
+from slamreplay.hindsight.sensed import sensed
 from slamreplay.hindsight.smoothing import smooth
 from slamreplay.hindsight.submaps import Submap, submaps
 from slamreplay.hindsight.trust import trusted_keyframes
+from slamreplay.hindsight.witnessed import witnessed_places
 from slamreplay.maps.grid import OccupancyGrid
 from slamreplay.matching.field import ScoreField, WorkingMap, working_map
 from slamreplay.matching.whole_map import search_space
@@ -67,14 +68,15 @@ def hindsight(view: BundleView, *, progress: Progress | None = None) -> Hindsigh
     if not lasers or grid is None or working is None:
         return None
     base = view.manifest.frames.base or "base_link"
-    whole = _rebuilt(base, grid, working, lasers, say)
+    whole = _rebuilt(view, base, grid, working, lasers, say)
     if whole is not None and (len(lasers) == 1 or whole.coverage >= _BOTH_KNOW):
         return whole
-    alone = _rebuilt(base, grid, working, lasers[:1], say)
+    alone = _rebuilt(view, base, grid, working, lasers[:1], say)
     return alone if whole is None or (alone and alone.coverage > whole.coverage) else whole
 
 
 def _rebuilt(
+    view: BundleView,
     base: str,
     grid: OccupancyGrid,
     working: WorkingMap,
@@ -119,16 +121,17 @@ def _rebuilt(
         jump_costs == JUMP_SOLID,
         lambda share: say("places on the map", 0.3 + 0.4 * share),
     )
-    places = best_places(hypotheses, motions, jump_costs)
+    other = sensed(view, motion, beams.t_ns[keys], chain.xyyaw, se2.inverse(working.origin_xyyaw))
+    places = witnessed_places(hypotheses, motions, jump_costs, chain, found, other)
     start, is_open = seat_keyframes(field, points, chain, found, places)
     say("pose graph", 0.7)
-    poses, cov = smooth(field, points, start, chain, is_open)
+    poses, cov = smooth(field, points, start, chain, is_open, other)
     key_beams = Beams(beams.t_ns[keys], beams.ends[keys], beams.kind[keys], beams.laser_xy)
     key_scores = scan_scores(field, key_beams, poses)
     typical = float(np.median(places.score))
     again = reseated(space, points, poses, chain, is_open, key_scores, typical)
     if again is not None:
-        poses, cov = smooth(field, points, again[0], chain, again[1])
+        poses, cov = smooth(field, points, again[0], chain, again[1], other)
         is_open, key_scores = again[1], scan_scores(field, key_beams, poses)
     say("every scan", 0.8)
     trusted = trusted_keyframes(places, chain, is_open, cov, key_scores)
@@ -151,6 +154,7 @@ def _rebuilt(
         match,
         places.margin,
         changes,
+        {} if other is None else other.joined(),
     )
 
 

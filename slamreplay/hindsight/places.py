@@ -41,6 +41,7 @@ class Places:
             None where there is no such sequence.
         doubt: (S,) log-likelihood by which it beats the best sequence that differs at this submap;
             inf where there is none.
+        total: log-likelihood of the sequence, up to a constant.
     """
 
     chosen: NDArray[np.int64]
@@ -49,6 +50,7 @@ class Places:
     jumps: NDArray[np.bool_]
     margin: float | None
     doubt: se2.Array
+    total: float = 0.0
 
 
 def best_places(
@@ -61,21 +63,12 @@ def best_places(
         motions: (S - 1, 3) measured motion from each submap's reference to the next one's.
         jump_cost: (S - 1,) what it costs to believe that it moved otherwise.
     """
-    unary = [WEIGHT * h.score for h in hypotheses]
-    pairs = []
-    for s, motion in enumerate(motions):
-        expected = se2.compose(hypotheses[s].xyyaw, motion)
-        miss = se2.between(expected[:, None, :], hypotheses[s + 1].xyyaw[None, :, :])
-        cost = ((miss / np.array([SIGMA_M, SIGMA_M, SIGMA_RAD])) ** 2).sum(axis=-1)
-        pairs.append(-np.minimum(0.5 * cost, jump_cost[s]))
+    unary, pairs = _likelihoods(hypotheses, motions, jump_cost)
     chosen, total, through = _viterbi(unary, pairs)
     poses = np.array([h.xyyaw[i] for h, i in zip(hypotheses, chosen, strict=True)])
     different = [_differs(h.xyyaw, pose) for h, pose in zip(hypotheses, poses, strict=True)]
-    margin = None
-    if all(d.any() for d in different):
-        barred = [np.where(d, u, -np.inf) for d, u in zip(different, unary, strict=True)]
-        other = _viterbi(barred, pairs)[1]
-        margin = float((total - other) / (WEIGHT * len(hypotheses)))
+    other = _barred(unary, pairs, different)
+    margin = None if other is None else float((total - other) / (WEIGHT * len(hypotheses)))
     doubt = np.array(
         [total - t[d].max() if d.any() else np.inf for t, d in zip(through, different, strict=True)]
     )
@@ -87,7 +80,43 @@ def best_places(
         dtype=bool,
     )
     score = np.array([h.score[i] for h, i in zip(hypotheses, chosen, strict=True)])
-    return Places(chosen, poses, score, jumps, margin, doubt)
+    return Places(chosen, poses, score, jumps, margin, doubt, total)
+
+
+def best_different(
+    hypotheses: Sequence[Hypotheses], motions: se2.Array, jump_cost: se2.Array, poses: se2.Array
+) -> float | None:
+    """Log-likelihood of the best sequence that differs everywhere from `poses` (S, 3).
+
+    On the scale of `Places.total`; None where there is no such sequence.
+    """
+    unary, pairs = _likelihoods(hypotheses, motions, jump_cost)
+    different = [_differs(h.xyyaw, pose) for h, pose in zip(hypotheses, poses, strict=True)]
+    return _barred(unary, pairs, different)
+
+
+def _likelihoods(
+    hypotheses: Sequence[Hypotheses], motions: se2.Array, jump_cost: se2.Array
+) -> tuple[list[se2.Array], list[se2.Array]]:
+    """Log-likelihoods of each submap's hypotheses and of each pair of neighbours'."""
+    unary = [WEIGHT * h.score for h in hypotheses]
+    pairs = []
+    for s, motion in enumerate(motions):
+        expected = se2.compose(hypotheses[s].xyyaw, motion)
+        miss = se2.between(expected[:, None, :], hypotheses[s + 1].xyyaw[None, :, :])
+        cost = ((miss / np.array([SIGMA_M, SIGMA_M, SIGMA_RAD])) ** 2).sum(axis=-1)
+        pairs.append(-np.minimum(0.5 * cost, jump_cost[s]))
+    return unary, pairs
+
+
+def _barred(
+    unary: Sequence[se2.Array], pairs: Sequence[se2.Array], different: Sequence[NDArray[np.bool_]]
+) -> float | None:
+    """Value of the best path through hypotheses under the masks."""
+    if not all(d.any() for d in different):
+        return None
+    barred = [np.where(d, u, -np.inf) for d, u in zip(different, unary, strict=True)]
+    return _viterbi(barred, pairs)[1]
 
 
 def _differs(xyyaw: se2.Array, pose: se2.Array) -> NDArray[np.bool_]:

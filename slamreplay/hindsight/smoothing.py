@@ -11,6 +11,7 @@ from slamreplay.geometry import se2
 from slamreplay.geometry.covariance import gtsam_from_planar
 from slamreplay.graph.planar import smooth_chain
 from slamreplay.hindsight.chain import Chain
+from slamreplay.hindsight.sensed import Sensed
 from slamreplay.matching.correlative import Window, match
 from slamreplay.matching.field import ScoreField
 from slamreplay.matching.thinning import thin
@@ -38,6 +39,7 @@ def smooth(
     start: se2.Array,
     chain: Chain,
     is_open: NDArray[np.bool_],
+    sensed: Sensed | None = None,
 ) -> tuple[se2.Array, se2.Array]:
     """Keyframe poses (K, 3) in the field's frame and their covariances (K, 3, 3) in its axes.
 
@@ -47,6 +49,7 @@ def smooth(
         start: (K, 3) where the places put the keyframes.
         chain: the scan-matched odometry between them.
         is_open: (K - 1,) where the motion is not known.
+        sensed: tags, docks and satellite fixes that join the graph.
     """
     thinned = [thin(p, 0.1) for p in points]
     motions = se2.between(chain.xyyaw[:-1], chain.xyyaw[1:])
@@ -59,8 +62,9 @@ def smooth(
         anchors = np.array([tops[k].xyyaw for k in held]).reshape(-1, 3)
         information = np.array([tops[k].information for k in held]).reshape(-1, 3, 3)
         anchor_cov = match_covariance(information, np.array([tops[k].score for k in held]))
+        seen, fixes = (None, None) if sensed is None else sensed.constraints(poses)
         poses, spread = smooth_chain(
-            poses, motions, cov, is_open, chain.is_solid[1:], held, anchors, anchor_cov
+            poses, motions, cov, is_open, chain.is_solid[1:], held, anchors, anchor_cov, seen, fixes
         )
     return poses, spread + np.diag(FLOOR**2)
 
