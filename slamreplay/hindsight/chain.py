@@ -10,12 +10,14 @@ from numpy.typing import NDArray
 
 from slamreplay.geometry import se2
 from slamreplay.matching.correlative import Match, Window, match, search_window
-from slamreplay.matching.field import ScoreField, points_field
+from slamreplay.matching.field import WORKING_RESOLUTION_M, ScoreField, points_field
 from slamreplay.matching.thinning import thin
 
 SIGMA_M = 0.08
 #: How many keyframes back the local map reaches, and how far around the robot.
 MEMORY, RADIUS_M = 12, 15.0
+#: Cells of a local map at the most.
+_ROOM = int(2.0 * (RADIUS_M + 1.0) / WORKING_RESOLUTION_M) ** 2
 #: Below this mean score (or at the window's edge) the odometry's word is doubted.
 GOOD, POOR = 0.6, 0.35
 #: A wider search must beat the narrow one by this much: the odometry is a witness as well.
@@ -68,7 +70,8 @@ def scan_matched(
     n = len(points)
     xyyaw, score = np.zeros((n, 3)), np.ones(n)
     is_break, information = np.zeros(n, dtype=bool), np.zeros((n, 3, 3))
-    memory: list[tuple[int, se2.Array]] = []
+    memory: list[tuple[int, se2.Array]] = []  # keyframes and their points where they were laid
+    room = np.empty(_ROOM, dtype=np.float32)
     for k in range(n):
         scan = thin(points[k], 0.1)
         if k and is_unknown[k]:
@@ -79,7 +82,7 @@ def scan_matched(
                 guess = se2.compose(last, se2.between(odometry[k - 1], odometry[k]))
             else:
                 guess = se2.compose(last, _expected(xyyaw, t_ns, is_break, k))
-            laid = _lay(memory, xyyaw, scan, guess, last)
+            laid = _lay(memory, scan, guess, last, room)
             score[k], information[k] = laid.score, laid.information
             # A poor match that contradicts odometry as well has no witness at all.
             poor = laid.score < POOR
@@ -91,7 +94,7 @@ def scan_matched(
         # Without odometry the scans come at sensor rate: what hardly moved adds nothing.
         step = se2.between(xyyaw[memory[-1][0]], xyyaw[k]) if memory else np.ones(3)
         if odometry is not None or np.hypot(step[0], step[1]) > 0.1 or abs(step[2]) > 0.1:
-            memory = [*memory[1 - MEMORY :], (k, scan)]
+            memory = [*memory[1 - MEMORY :], (k, se2.transform_points(xyyaw[k], scan))]
     is_solid = (score >= GOOD) & ~is_break
     if odometry is not None:
         counted = se2.between(odometry[:-1], odometry[1:])
@@ -118,12 +121,12 @@ def _agree(a: se2.Array, b: se2.Array) -> NDArray[np.bool_]:
 
 def _lay(
     memory: list[tuple[int, se2.Array]],
-    xyyaw: se2.Array,
     scan: se2.Array,
     guess: se2.Array,
     last: se2.Array,
+    room: NDArray[np.float32],
 ) -> Match:
-    field = _local_map(memory, xyyaw, last)
+    field = _local_map(memory, last, room)
     if field is None or not len(scan):
         return Match(guess, 0.0, np.zeros((3, 3)))
     start, _ = search_window(field, scan[::2], guess, NARROW)
@@ -138,8 +141,9 @@ def _lay(
 
 
 def _local_map(
-    memory: list[tuple[int, se2.Array]], xyyaw: se2.Array, centre: se2.Array
+    memory: list[tuple[int, se2.Array]], centre: se2.Array, room: NDArray[np.float32]
 ) -> ScoreField | None:
-    cloud = np.concatenate([se2.transform_points(xyyaw[k], points) for k, points in memory])
-    near = np.abs(cloud - centre[:2]).max(axis=1) < RADIUS_M
-    return points_field(cloud[near], SIGMA_M) if near.any() else None
+    cloud = np.concatenate([points for _, points in memory])
+    off = np.abs(cloud - centre[:2]) < RADIUS_M
+    near = off[:, 0] & off[:, 1]
+    return points_field(cloud[near], SIGMA_M, room=room) if near.any() else None
