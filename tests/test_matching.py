@@ -1,13 +1,15 @@
 """Matching against plain-numpy twins and against poses that are known."""
 
+import numba
 import numpy as np
 import pytest
 
 from slamreplay.geometry import se2
 from slamreplay.maps.grid import OccupancyGrid
 from slamreplay.maps.raycast import cast_rays
-from slamreplay.matching.correlative import Window, climb, match, search_window
+from slamreplay.matching.correlative import Window, climb, match, match_each, search_window
 from slamreplay.matching.field import ScoreField, points_field, working_map
+from slamreplay.matching.kernels import _derivatives
 from slamreplay.matching.thinning import thin, thin_persistent
 from slamreplay.matching.whole_map import _score_lattice, search_map, search_space
 from slamreplay.testing.synthetic import room_grid
@@ -30,6 +32,33 @@ def plain_score(field: ScoreField, points: np.ndarray, pose: np.ndarray) -> floa
     height, width = field.values.shape
     inside = (row >= 0) & (row < height) & (col >= 0) & (col < width)
     return float(field.values[row[inside], col[inside]].sum() / len(points))
+
+
+def plain_total(field: ScoreField, points: np.ndarray, pose: np.ndarray) -> float:
+    """Summed score between cell centres."""
+    u = (se2.transform_points(pose, points) - field.corner_xy) / field.resolution_m - 0.5
+    height, width = field.values.shape
+    u = u[(u >= 0.0).all(axis=1) & (u[:, 0] < width - 1) & (u[:, 1] < height - 1)]
+    cell = u.astype(int)
+    total = 0.0
+    for dx in (0, 1):
+        for dy in (0, 1):
+            weight = np.abs(1 - np.array([dx, dy]) - (u - cell)).prod(axis=1)
+            total += (weight * field.values[cell[:, 1] + dy, cell[:, 0] + dx]).sum()
+    return total
+
+
+def plain_thin(points: np.ndarray, spacing_m: float) -> np.ndarray:
+    cells = np.floor(points / spacing_m)
+    order = np.unique(cells[:, ::-1], axis=0)[:, ::-1]
+    return np.array([points[(cells == cell).all(axis=1)].mean(axis=0) for cell in order])
+
+
+def test_thinning_equals_its_plain_twin():
+    points = RNG.uniform(-2.0, 3.0, (400, 2))
+
+    np.testing.assert_allclose(thin(points, 0.25), plain_thin(points, 0.25), rtol=0, atol=1e-14)
+    assert thin(np.empty((0, 2)), 0.1).shape == (0, 2)
 
 
 def test_thinning_gives_each_lattice_cell_its_mean():
@@ -60,6 +89,16 @@ def test_points_field_is_the_largest_bell_over_each_cell():
 
     near = expected > np.exp(-0.5 * 2.5**2)
     np.testing.assert_allclose(field.values[near], expected[near], atol=1e-6)
+
+
+def test_a_field_in_room_that_was_used_before_is_the_same():
+    points, room = RNG.uniform(0.0, 1.0, (5, 2)), np.ones(5000, dtype=np.float32)
+
+    inside, fresh = points_field(points, 0.08, room=room), points_field(points, 0.08)
+
+    assert np.shares_memory(inside.values, room)
+    np.testing.assert_array_equal(inside.values, fresh.values)
+    assert points_field(points, 0.08, room=room[:9]).values.shape == fresh.values.shape
 
 
 def test_working_map_is_cropped_and_thinned_and_keeps_its_place():
@@ -101,6 +140,61 @@ def test_window_search_finds_the_best_pose_of_its_lattice():
     best = max(plain_score(field, points, p) for p in poses)
     assert score == pytest.approx(best, abs=1e-6)
     assert plain_score(field, points, pose) == pytest.approx(best, abs=1e-6)
+
+
+def test_derivatives_are_central_differences_of_the_plain_sum():
+    # Some of the points lie on the field's edge and outside it.
+    field = points_field(RNG.uniform(-1.0, 1.0, (60, 2)), 0.1)
+    points = RNG.uniform(-1.4, 1.4, (300, 2))
+    pose, steps = np.array([0.02, 0.03, 0.1]), np.diag([field.resolution_m] * 2 + [0.01])
+    gradient, information = np.zeros(3), np.zeros((3, 3))
+    frame = (field.values, field.resolution_m, *field.corner_xy)
+
+    _derivatives(*frame, points, pose, np.zeros((3, 3, 3)), gradient, information)
+
+    def total(*moves: np.ndarray) -> float:
+        return plain_total(field, points, pose + np.sum(moves, axis=0))
+
+    for i, a in enumerate(steps):
+        assert gradient[i] == pytest.approx((total(a) - total(-a)) / (2 * a[i]), abs=1e-6)
+        bend = total(a) - 2 * total(np.zeros(3)) + total(-a)
+        assert information[i, i] == pytest.approx(-bend / a[i] ** 2, abs=1e-5)
+        for j, b in enumerate(steps[:i]):
+            twist = total(a, b) - total(a, -b) - total(-a, b) + total(-a, -b)
+            assert information[i, j] == pytest.approx(-twist / (4 * a[i] * b[j]), abs=1e-5)
+            assert information[i, j] == information[j, i]
+
+
+def test_matching_many_equals_matching_each_on_any_number_of_threads(monkeypatch):
+    field = points_field(RNG.uniform(-2.0, 2.0, (200, 2)), 0.1)
+    clouds = [RNG.uniform(-2.0, 2.0, (n, 2)) for n in RNG.integers(0, 60, 70)]
+    centres = RNG.normal(0.0, 0.1, (70, 3))
+    windows = [Window(0.2, 0.1, 0.1, 0.05, 0.1), Window(0.1, 0.1, 0.0, 0.1)] * 35
+    found = []
+
+    for threads in (1, 2, 3):
+        monkeypatch.setattr(numba.config, "NUMBA_NUM_THREADS", threads)
+        found.append(match_each(field, clouds, centres, windows))
+
+    for one in found[1:]:
+        assert one.xyyaw.tobytes() == found[0].xyyaw.tobytes()
+        assert one.information.tobytes() == found[0].information.tobytes()
+    for k, (cloud, centre, window) in enumerate(zip(clouds, centres, windows, strict=True)):
+        single = match(field, cloud, centre, window)
+        assert single.xyyaw.tobytes() == found[0].xyyaw[k].tobytes()
+        assert single.score == found[0].score[k]
+
+
+def test_one_cloud_is_matched_at_many_places():
+    field = points_field(RNG.uniform(-2.0, 2.0, (200, 2)), 0.1)
+    cloud, centres = RNG.uniform(-2.0, 2.0, (50, 2)), RNG.normal(0.0, 0.1, (20, 3))
+
+    found = match_each(field, [cloud], centres, None)
+
+    assert [m.xyyaw.tolist() for m in (climb(field, cloud, c) for c in centres)] == (
+        found.xyyaw.tolist()
+    )
+    assert match_each(field, [cloud], np.empty((0, 3)), None).score.shape == (0,)
 
 
 def test_climb_reaches_the_true_pose():

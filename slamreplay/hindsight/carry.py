@@ -11,13 +11,15 @@ from slamreplay.hindsight.beams import HIT, Beams
 from slamreplay.hindsight.keyframes import MIN_POINTS
 from slamreplay.hindsight.smoothing import MIN_SCORE, match_covariance
 from slamreplay.hindsight.way import between_keyframes
-from slamreplay.matching.correlative import Window, match
+from slamreplay.matching.correlative import Window, match_each
 from slamreplay.matching.field import ScoreField
 from slamreplay.matching.thinning import thin
 
 WINDOW = Window(0.1, 0.1, 0.09, 0.03, pull=0.05)
 #: The same where odometry missed much of the way (slip, a robot that is carried).
 WIDE = Window(0.4, 0.1, 0.36, 0.04, pull=0.05)
+#: Scans that are matched in one go: their points are held at once.
+_AT_ONCE = 4000
 
 
 def carry(
@@ -87,25 +89,27 @@ def settle(
     sigma_m = 0.02 + 0.1 * np.hypot(way[:, 0], way[:, 1]) + 0.03 * np.abs(way[:, 2])
     sigma = np.stack([sigma_m, sigma_m, 0.005 + 0.4 * np.abs(way[:, 2])], axis=1)
     sigma = np.hypot(sigma, doubt)
-    is_wide = np.any(doubt > np.array([0.08, 0.08, 0.06]), axis=1).tolist()
+    is_wide = np.any(doubt > np.array([0.08, 0.08, 0.06]), axis=1)
     poses, spread = carried.copy(), cov.copy()
     moved = np.flatnonzero(np.isfinite(carried).all(axis=1) & (near != np.arange(len(near))))
-    for k in moved.tolist():
-        prior = cov[k] + np.diag(sigma[k] ** 2)
-        spread[k] = prior
-        points = thin(beams.points(k), 0.1)
-        if len(points) < MIN_POINTS:
-            continue
-        window = WIDE if is_wide[k] else WINDOW
-        top = match(field, points, carried[k], window)
-        off = top.xyyaw - carried[k]
-        too_far = np.hypot(off[0], off[1]) > window.reach_m + 0.2
-        if top.score < MIN_SCORE or too_far or abs(off[2]) > window.reach_rad + 0.06:
-            continue
-        measured = match_covariance(top.information[None], np.array([top.score]))[0]
+    spread[moved] += sigma[moved, :, None] ** 2 * np.eye(3)
+    for first in range(0, len(moved), _AT_ONCE):
+        some = moved[first : first + _AT_ONCE]
+        clouds = [thin(beams.points(k), 0.1) for k in some.tolist()]
+        enough = np.array([len(points) >= MIN_POINTS for points in clouds])
+        windows = [WIDE if w else WINDOW for w in is_wide[some].tolist()]
+        tops = match_each(field, clouds, carried[some], windows)
+        off = tops.xyyaw - carried[some]
+        reach_m = np.array([w.reach_m for w in windows])
+        reach_rad = np.array([w.reach_rad for w in windows])
+        fits = enough & (tops.score >= MIN_SCORE) & (np.abs(off[:, 2]) <= reach_rad + 0.06)
+        fits &= np.hypot(off[:, 0], off[:, 1]) <= reach_m + 0.2
+        held, off = some[fits], off[fits]
+        measured = match_covariance(tops.information[fits], tops.score[fits])
+        prior = spread[held]
         gain = prior @ np.linalg.inv(prior + measured)
-        poses[k] = carried[k] + gain @ off
-        spread[k] = prior - gain @ prior
+        poses[held] = carried[held] + np.einsum("nij,nj->ni", gain, off)
+        spread[held] = prior - gain @ prior
     return poses, 0.5 * (spread + np.swapaxes(spread, 1, 2))
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from slamreplay.geometry import se2
 from slamreplay.hindsight.places import Hypotheses
 from slamreplay.hindsight.submaps import Submap, blocked_share
-from slamreplay.matching.correlative import Window, climb, match
+from slamreplay.matching.correlative import Window, match_each
 from slamreplay.matching.field import WorkingMap
 from slamreplay.matching.whole_map import SearchSpace, distinct, search_map
 
@@ -94,11 +94,13 @@ def _joined(
     is_sure: bool,
 ) -> Hypotheses:
     """The known places and those that a neighbour's lead to; sure motion needs no window."""
-    tops = [] if is_sure else [match(space.fine, submap.points, pose, _NEAR) for pose in new]
     # As expected and unmoved too: where nothing of the map is left, a window leads astray.
-    stays = [climb(space.fine, submap.points, pose) for pose in (new if is_sure else new[:1])]
-    poses = np.array([m.xyyaw for m in (*tops, *stays)])
-    fresh = _scored(working, submap, poses, np.array([m.score for m in (*tops, *stays)]))
+    found = match_each(space.fine, [submap.points], new if is_sure else new[:1], None)
+    poses, scores = found.xyyaw, found.score
+    if not is_sure:
+        near = match_each(space.fine, [submap.points], new, _NEAR)
+        poses, scores = np.concatenate([near.xyyaw, poses]), np.append(near.score, scores)
+    fresh = _scored(working, submap, poses, scores)
     poses = np.concatenate([known.xyyaw, fresh.xyyaw])
     scores = np.concatenate([known.score, fresh.score])
     keep = distinct(poses, scores, len(poses), apart_m=0.1, apart_rad=0.05)

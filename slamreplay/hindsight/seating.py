@@ -9,7 +9,7 @@ from slamreplay.geometry import se2
 from slamreplay.hindsight.chain import Chain
 from slamreplay.hindsight.places import Places
 from slamreplay.hindsight.submaps import Submap, owners
-from slamreplay.matching.correlative import climb
+from slamreplay.matching.correlative import match_each
 from slamreplay.matching.field import ScoreField
 from slamreplay.matching.thinning import thin
 
@@ -57,6 +57,4 @@ def _relative(chain: Chain, submap: Submap, members: NDArray[np.int64]) -> se2.A
 def _fit(
     field: ScoreField, points: list[se2.Array], members: NDArray[np.int64], poses: se2.Array
 ) -> se2.Array:
-    return np.array(
-        [climb(field, thin(points[k], 0.1), p).score for k, p in zip(members, poses, strict=True)]
-    )
+    return match_each(field, [thin(points[k], 0.1) for k in members], poses, None).score

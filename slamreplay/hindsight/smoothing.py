@@ -12,7 +12,7 @@ from slamreplay.geometry.covariance import gtsam_from_planar
 from slamreplay.graph.planar import smooth_chain
 from slamreplay.hindsight.chain import Chain
 from slamreplay.hindsight.sensed import Sensed
-from slamreplay.matching.correlative import Window, match
+from slamreplay.matching.correlative import Window, match_each
 from slamreplay.matching.field import ScoreField
 from slamreplay.matching.thinning import thin
 
@@ -57,11 +57,10 @@ def smooth(
     poses = start
     spread = np.broadcast_to(np.diag(FLOOR**2), (len(start), 3, 3))
     for window in WINDOWS:
-        tops = [match(field, p, at, window) for p, at in zip(thinned, poses, strict=True)]
-        held = np.flatnonzero([m.score >= MIN_SCORE for m in tops])
-        anchors = np.array([tops[k].xyyaw for k in held]).reshape(-1, 3)
-        information = np.array([tops[k].information for k in held]).reshape(-1, 3, 3)
-        anchor_cov = match_covariance(information, np.array([tops[k].score for k in held]))
+        tops = match_each(field, thinned, poses, window)
+        held = np.flatnonzero(tops.score >= MIN_SCORE)
+        anchors = tops.xyyaw[held]
+        anchor_cov = match_covariance(tops.information[held], tops.score[held])
         seen, fixes = (None, None) if sensed is None else sensed.constraints(poses)
         poses, spread = smooth_chain(
             poses, motions, cov, is_open, chain.is_solid[1:], held, anchors, anchor_cov, seen, fixes

@@ -7,15 +7,19 @@ second derivatives taken by central differences.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
+from numpy.typing import NDArray
 
 from slamreplay.geometry import se2
+from slamreplay.matching import kernels
 from slamreplay.matching.field import ScoreField
+from slamreplay.matching.threads import share_out
 
-_DAMPING_SIGMA_M = 0.1
+#: So many jobs are worth a thread of their own.
+_WORTH_A_THREAD = 16
 
 
 @dataclass(frozen=True)
@@ -48,172 +52,93 @@ class Match:
     information: se2.Array
 
 
+@dataclass(frozen=True, eq=False)
+class Matches:
+    """N matched poses: `xyyaw` (N, 3), `score` (N,) and `information` (N, 3, 3), as in `Match`."""
+
+    xyyaw: se2.Array
+    score: se2.Array
+    information: se2.Array
+
+
 def search_window(
     field: ScoreField, points: se2.Array, centre: se2.Array, window: Window
 ) -> tuple[se2.Array, float]:
     """The best pose (3,) of a window around `centre` and its mean score (without the pull)."""
     best = np.append(np.asarray(centre, dtype=np.float64), 0.0)
-    shape = np.array(
-        [window.reach_m, window.step_m, window.reach_rad, window.step_rad, window.pull]
-    )
+    shape = _shape(window)
+    totals, cells = _window_scratch(shape[None])
     points = np.ascontiguousarray(points)
-    _search(field.values, *_frame(field), points, np.empty_like(points), shape, best)
+    kernels.search(*_frame(field), points, shape, best, totals, cells)
     return best[:3], float(best[3])
 
 
 def climb(field: ScoreField, points: se2.Array, start: se2.Array) -> Match:
     """The top of the score near `start` (within some centimetres), with its curvature."""
-    pose = np.array(start, dtype=np.float64)
-    if not len(points):
-        return Match(pose, 0.0, np.zeros((3, 3)))
-    # Damping goes with the number of points and their lever, so that a direction which no point
-    # holds does not move.
-    lever = 1.0 + float(np.mean(np.sum(points**2, axis=1)))
-    scale = np.array([1.0, 1.0, lever]) * len(points) / _DAMPING_SIGMA_M**2
-    information = np.zeros((3, 3))
-    trial, gradient, damped = pose.copy(), np.zeros(3), np.zeros((3, 3))
-    total = _climb(
-        field.values,
-        *_frame(field),
-        np.ascontiguousarray(points),
-        pose,
-        scale,
-        information,
-        trial,
-        gradient,
-        damped,
-    )
-    return Match(pose, total / len(points), information)
+    return _only(match_each(field, [points], np.asarray(start)[None], None))
 
 
 def match(field: ScoreField, points: se2.Array, centre: se2.Array, window: Window) -> Match:
     """Window search, then the climb."""
-    return climb(field, points, search_window(field, points, centre, window)[0])
+    return _only(match_each(field, [points], np.asarray(centre)[None], window))
 
 
-def _frame(field: ScoreField) -> tuple[float, float, float]:
-    return field.resolution_m, float(field.corner_xy[0]), float(field.corner_xy[1])
+def match_each(
+    field: ScoreField,
+    clouds: Sequence[se2.Array],
+    centres: se2.Array,
+    window: Window | Sequence[Window] | None,
+) -> Matches:
+    """`match` for many at once, on all cores.
+
+    Args:
+        field: the field of all of them.
+        clouds: points (M, 2) of each of N, or of one that is matched at N places.
+        centres: (N, 3) where to look.
+        window: of all or of each; None climbs only.
+    """
+    poses = np.array(centres, dtype=np.float64).reshape(-1, 3)
+    count = len(poses)
+    stops = np.cumsum([0, *map(len, clouds)], dtype=np.int64)
+    bounds = np.column_stack([stops[:-1], stops[1:]])
+    bounds = np.ascontiguousarray(np.broadcast_to(bounds, (count, 2)))
+    points = np.concatenate([np.empty((0, 2)), *clouds])
+    if isinstance(window, Sequence):
+        shapes = np.array([_shape(w) for w in window]).reshape(count, 5)
+    else:
+        shapes = np.zeros((count, 5)) + (0.0 if window is None else _shape(window))
+    found = Matches(poses, np.zeros(count), np.zeros((count, 3, 3)))
+    out = (found.xyyaw, found.score, found.information)
+
+    def work(first: int, stop: int) -> None:
+        scratch = (
+            *_window_scratch(shapes),
+            np.zeros(4),
+            np.zeros((3, 3, 3)),
+            np.zeros((3, 3)),
+            np.zeros((3, 3)),
+        )
+        kernels.match_jobs(_frame(field), points, bounds, shapes, first, stop, out, scratch)
+
+    if count:
+        share_out(count, work, _WORTH_A_THREAD)
+    return found
 
 
-# The kernels work on scalars and on arrays they are handed: each array expression inside one would
-# cost half a second of compilation.
+def _only(found: Matches) -> Match:
+    return Match(found.xyyaw[0], float(found.score[0]), found.information[0])
 
 
-@njit(cache=True)
-def _search(values, resolution, x0, y0, points, turned, window, best):  # type: ignore[no-untyped-def]
-    height, width = values.shape
-    reach, step, reach_yaw, step_yaw, pull = window[0], window[1], window[2], window[3], window[4]
-    n, n_yaw = int(np.ceil(reach / step - 1e-9)), int(np.ceil(reach_yaw / step_yaw - 1e-9))
-    count = points.shape[0]
-    x, y, heading = best[0], best[1], best[2]
-    best_pulled = -np.inf
-    for k in range(-n_yaw, n_yaw + 1):
-        yaw = heading + k * step_yaw
-        cos, sin = np.cos(yaw), np.sin(yaw)
-        for p in range(count):
-            turned[p, 0] = (x + cos * points[p, 0] - sin * points[p, 1] - x0) / resolution
-            turned[p, 1] = (y + sin * points[p, 0] + cos * points[p, 1] - y0) / resolution
-        turn = (k / n_yaw) ** 2 if n_yaw > 0 else 0.0
-        for i in range(-n, n + 1):
-            dy = i * step / resolution
-            for j in range(-n, n + 1):
-                dx = j * step / resolution
-                total = np.float32(0.0)
-                for p in range(count):
-                    col, row = int(turned[p, 0] + dx), int(turned[p, 1] + dy)
-                    if 0 <= row < height and 0 <= col < width:
-                        total += values[row, col]
-                score = total / max(count, 1)
-                shift = (i * i + j * j) / (n * n) if n > 0 else 0.0
-                pulled = score - pull * (turn + shift)
-                if pulled > best_pulled:
-                    best_pulled = pulled
-                    best[0], best[1], best[2], best[3] = x + j * step, y + i * step, yaw, score
+def _frame(field: ScoreField) -> tuple[NDArray[np.float32], float, float, float]:
+    return field.values, field.resolution_m, float(field.corner_xy[0]), float(field.corner_xy[1])
 
 
-@njit(cache=True)
-def _total(values, resolution, x0, y0, points, x, y, yaw):  # type: ignore[no-untyped-def]
-    """Summed score of all points at a pose, bilinear between cell centres."""
-    height, width = values.shape
-    cos, sin = np.cos(yaw), np.sin(yaw)
-    total = 0.0
-    for p in range(points.shape[0]):
-        u = (x + cos * points[p, 0] - sin * points[p, 1] - x0) / resolution - 0.5
-        v = (y + sin * points[p, 0] + cos * points[p, 1] - y0) / resolution - 0.5
-        if u >= 0.0 and v >= 0.0 and u < width - 1.0 and v < height - 1.0:
-            col, row = int(u), int(v)
-            fu, fv = u - col, v - row
-            low = values[row, col] * (1.0 - fu) + values[row, col + 1] * fu
-            high = values[row + 1, col] * (1.0 - fu) + values[row + 1, col + 1] * fu
-            total += low * (1.0 - fv) + high * fv
-    return total
+def _shape(window: Window) -> se2.Array:
+    return np.array([window.reach_m, window.step_m, window.reach_rad, window.step_rad, window.pull])
 
 
-@njit(cache=True)
-def _derivatives(  # type: ignore[no-untyped-def]
-    values, resolution, x0, y0, points, pose, top, trial, gradient, information
-):
-    """Central differences of the summed score: its gradient and minus its second derivatives."""
-    for i in range(3):
-        for j in range(i + 1):
-            hi, hj = (0.01 if i == 2 else resolution), (0.01 if j == 2 else resolution)
-            mixed = up = down = 0.0
-            for corner in range(2 if i == j else 4):
-                si, sj = 1.0 - 2.0 * (corner % 2), 1.0 - 2.0 * (corner // 2)
-                trial[0], trial[1], trial[2] = pose[0], pose[1], pose[2]
-                trial[i] += si * hi
-                if i != j:
-                    trial[j] += sj * hj
-                total = _total(values, resolution, x0, y0, points, trial[0], trial[1], trial[2])
-                mixed += si * sj * total
-                up, down = (total, down) if si > 0.0 else (up, total)
-            if i == j:
-                gradient[i] = (up - down) / (2.0 * hi)
-                information[i, i] = -(up - 2.0 * top + down) / (hi * hi)
-            else:
-                information[i, j] = information[j, i] = -mixed / (4.0 * hi * hj)
-
-
-@njit(cache=True)
-def _newton_step(A, b, step):  # type: ignore[no-untyped-def]
-    """Write x of A x = b, for a symmetric 3x3 A, by cofactors, into `step`, kept short."""
-    c00 = A[1, 1] * A[2, 2] - A[1, 2] * A[2, 1]
-    c01 = A[1, 2] * A[2, 0] - A[1, 0] * A[2, 2]
-    c02 = A[1, 0] * A[2, 1] - A[1, 1] * A[2, 0]
-    c11 = A[0, 0] * A[2, 2] - A[0, 2] * A[2, 0]
-    c12 = A[0, 1] * A[2, 0] - A[0, 0] * A[2, 1]
-    c22 = A[0, 0] * A[1, 1] - A[0, 1] * A[1, 0]
-    det = A[0, 0] * c00 + A[0, 1] * c01 + A[0, 2] * c02
-    inverse = 0.0 if det == 0.0 else 1.0 / det
-    step[0] = min(max((c00 * b[0] + c01 * b[1] + c02 * b[2]) * inverse, -0.1), 0.1)
-    step[1] = min(max((c01 * b[0] + c11 * b[1] + c12 * b[2]) * inverse, -0.1), 0.1)
-    step[2] = min(max((c02 * b[0] + c12 * b[1] + c22 * b[2]) * inverse, -0.05), 0.05)
-
-
-@njit(cache=True)
-def _climb(  # type: ignore[no-untyped-def]
-    values, resolution, x0, y0, points, pose, scale, information, step, gradient, damped
-):
-    """Move `pose` to the top of the score; leave its curvature in `information`."""
-    top = _total(values, resolution, x0, y0, points, pose[0], pose[1], pose[2])
-    damping = 1e-2
-    for _ in range(12):
-        _derivatives(values, resolution, x0, y0, points, pose, top, step, gradient, information)
-        rise = 0.0
-        for _attempt in range(4):
-            for i in range(3):
-                for j in range(3):
-                    damped[i, j] = information[i, j]
-                damped[i, i] = max(information[i, i], 0.0) + damping * scale[i]
-            _newton_step(damped, gradient, step)
-            x, y, yaw = pose[0] + step[0], pose[1] + step[1], pose[2] + step[2]
-            total = _total(values, resolution, x0, y0, points, x, y, yaw)
-            if total > top:
-                rise = total - top
-                pose[0], pose[1], pose[2], top = x, y, yaw, total
-                damping = max(damping / 4.0, 1e-3)
-                break
-            damping *= 8.0
-        if rise <= 1e-5 * points.shape[0]:
-            break
-    return top
+def _window_scratch(shapes: se2.Array) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
+    """Sums of the largest window's places, and the cells of a point shifted to them."""
+    reach = np.ceil(shapes[:, 0] / np.where(shapes[:, 1] > 0.0, shapes[:, 1], 1.0))
+    side = 2 * int(reach.max(initial=0.0)) + 1
+    return np.zeros((side, side), dtype=np.float32), np.zeros((2, side), dtype=np.int64)

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt, maximum_filter
 
 from slamreplay.geometry import se2
-from slamreplay.matching.correlative import Window, climb, search_window
+from slamreplay.matching.correlative import Window, match_each
 from slamreplay.matching.field import ScoreField, WorkingMap
 
 #: uint16 sums of bytes up to 250 hold 262 points.
@@ -83,13 +83,9 @@ def search_map(
     # The lattice leaves half a cell and half a heading step to either side.
     half = space.cell_m / 2.0
     window = Window(half, half / 2.0, heading_step_rad / 2.0, heading_step_rad / 2.0)
-    tops = [
-        climb(space.fine, points, search_window(space.fine, points, s, window)[0]) for s in starts
-    ]
-    poses = np.array([m.xyyaw for m in tops]).reshape(-1, 3)
-    scores = np.array([m.score for m in tops])
-    keep = distinct(poses, scores, count)
-    return poses[keep], scores[keep]
+    tops = match_each(space.fine, [points], starts, window)
+    keep = distinct(tops.xyyaw, tops.score, count)
+    return tops.xyyaw[keep], tops.score[keep]
 
 
 def distinct(
