@@ -9,7 +9,7 @@ from slamreplay.bundle.track import PoseTrack
 from slamreplay.geometry import se2
 from slamreplay.hindsight.beams import HIT, INVALID, MISS, Beams, interleaved, side_by_side
 from slamreplay.hindsight.changes import find_changes
-from slamreplay.hindsight.keyframes import keyframes
+from slamreplay.hindsight.keyframes import keyframes, with_more
 from slamreplay.hindsight.pipeline import motion_by_scans
 from slamreplay.hindsight.places import JUMP_DOUBTFUL, JUMP_SOLID, Hypotheses, best_places
 from slamreplay.maps.grid import OccupancyGrid
@@ -162,6 +162,14 @@ def test_unknown_motion_has_a_keyframe_on_either_side():
     beams = beams_in([hall().cells] * 10)
 
     assert keyframes(beams, np.zeros((10, 3)), np.arange(10) == 6).tolist() == [0, 5, 6]
+
+
+def test_link_that_odometry_missed_gets_more_keyframes():
+    beams = beams_in([hall().cells] * 3 + [with_box((20, 20), (40, 60))] * 3)
+    keys = np.array([0, 5])
+
+    assert with_more(beams, keys, np.array([True])).tolist() == [0, 3, 5]
+    assert with_more(beams, keys, np.array([False])).tolist() == [0, 5]
 
 
 def test_without_odometry_a_gap_in_the_scans_is_a_break():

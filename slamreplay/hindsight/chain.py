@@ -97,9 +97,18 @@ def scan_matched(
             memory = [*memory[1 - MEMORY :], (k, se2.transform_points(xyyaw[k], scan))]
     is_solid = (score >= GOOD) & ~is_break
     if odometry is not None:
-        counted = se2.between(odometry[:-1], odometry[1:])
-        is_solid[1:] &= _agree(counted, se2.between(xyyaw[:-1], xyyaw[1:]))
+        is_solid[1:] &= ~_torn(xyyaw, odometry)
     return Chain(xyyaw, score, is_break, is_solid, information)
+
+
+def torn_links(chain: Chain, odometry: se2.Array) -> NDArray[np.bool_]:
+    """(K - 1,) links that are broken, or of which odometry (K, 3) tells another motion."""
+    return chain.is_break[1:] | _torn(chain.xyyaw, odometry)
+
+
+def _torn(xyyaw: se2.Array, odometry: se2.Array) -> NDArray[np.bool_]:
+    told = se2.between(odometry[:-1], odometry[1:])
+    return ~_agree(told, se2.between(xyyaw[:-1], xyyaw[1:]))
 
 
 def _expected(

@@ -19,10 +19,10 @@ from slamreplay.geometry import se2
 from slamreplay.geometry.covariance import turned
 from slamreplay.hindsight.beams import Beams, beams_of, interleaved, side_by_side
 from slamreplay.hindsight.carry import carry, scan_scores, settle
-from slamreplay.hindsight.chain import Chain, scan_matched
+from slamreplay.hindsight.chain import Chain, scan_matched, torn_links
 from slamreplay.hindsight.changes import find_changes
 from slamreplay.hindsight.deskew import longest_sweep_s, motion_as_matched
-from slamreplay.hindsight.keyframes import keyframes
+from slamreplay.hindsight.keyframes import keyframes, with_more
 from slamreplay.hindsight.places import (
     JUMP_BROKEN,
     JUMP_DOUBTFUL,
@@ -95,11 +95,12 @@ def _rebuilt(
     keys = keyframes(beams, odometry, is_unknown)
     if not len(keys):
         return _nowhere(grid.frame_id, base, beams)
-    points = [beams.points(k) for k in keys]
     say("scan matching", 0.05)
-    parts = np.cumsum(is_unknown)[keys]
-    over_unknown = np.append(False, parts[1:] > parts[:-1])
-    chain = scan_matched(points, odometry[keys], beams.t_ns[keys], over_unknown)
+    points, chain = _chained(beams, odometry, keys, is_unknown)
+    is_torn = torn_links(chain, odometry[keys])
+    if (more := with_more(beams, keys, is_torn)).size > keys.size:
+        keys = more
+        points, chain = _chained(beams, odometry, keys, is_unknown)
     matched = motion_as_matched(base, beams.t_ns, odometry, keys, chain, longest_sweep_s(lasers))
     if matched is not None:
         motion, each = matched, [beams_of(laser, matched) for laser in lasers]
@@ -156,6 +157,16 @@ def _rebuilt(
         changes,
         {} if other is None else other.joined(),
     )
+
+
+def _chained(
+    beams: Beams, odometry: se2.Array, keys: NDArray[np.int64], is_unknown: NDArray[np.bool_]
+) -> tuple[list[se2.Array], Chain]:
+    """Points of the keyframes, and how their scans lie to each other."""
+    points = [beams.points(k) for k in keys]
+    parts = np.cumsum(is_unknown)[keys]
+    over_unknown = np.append(False, parts[1:] > parts[:-1])
+    return points, scan_matched(points, odometry[keys], beams.t_ns[keys], over_unknown)
 
 
 def _second_misfits(
