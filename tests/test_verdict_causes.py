@@ -9,14 +9,17 @@ import pytest
 from slamreplay.bundle.belief import recorded_belief
 from slamreplay.bundle.odometry import odometry_track
 from slamreplay.bundle.products import ChangedRegion, Changes, Hindsight
+from slamreplay.bundle.run import Trial
 from slamreplay.bundle.schema import TABLES
 from slamreplay.bundle.tables import Table
 from slamreplay.bundle.track import PoseTrack
 from slamreplay.geometry import se2, se3
 from slamreplay.geometry.times import ns
 from slamreplay.ingest.pipeline import ingest
+from slamreplay.perturb import PERTURBATIONS
 from slamreplay.perturb.scan_delay import ScanDelay
 from slamreplay.perturb.tf_delay import TfDelay
+from slamreplay.replay.runner import run_trial
 from slamreplay.testing.synthetic import START_NS, room_grid, synthetic_bundle, true_path
 from slamreplay.verdict.actions import Outcome, actions, risky
 from slamreplay.verdict.belief_error import belief_error
@@ -25,6 +28,7 @@ from slamreplay.verdict.contract import contract_findings
 from slamreplay.verdict.judge import judge
 from slamreplay.verdict.limits import Limits
 from slamreplay.verdict.map_frame import constant_offset
+from slamreplay.verdict.scan_gaps import scan_gaps
 from slamreplay.verdict.summary import MOST_CHARACTERS
 from slamreplay.verdict.timing import scan_delay
 from slamreplay.verdict.wander import is_pulled_back
@@ -270,6 +274,66 @@ def test_a_change_where_the_belief_left_the_truth_comes_before_a_wrong_match():
     assert plain.failure_mode.kind == "association_error"
     assert changed.failure_mode.kind == "stale_map_use"
     assert any("m² appeared" in line for line in changed.failure_mode.evidence)
+
+
+#: What a perturbation does to a log is what the failure mode says was done to it.
+REPRODUCED = [
+    ("tf_delay.odometry", 0.3, "timing", "odometry"),
+    ("scan_delay.stamp", 0.3, "timing", "scans are stamped"),
+    ("scan_drop.burst", 6.0, "timing", "no scan came for"),
+    ("scan_drop.random", 0.9, "timing", "no scan came for"),
+    ("initial_pose.offset", 3.0, "wrong_initial_pose", "first belief"),
+    ("initial_pose.rotate", 90.0, "wrong_initial_pose", "first belief"),
+    ("odometry_scale.translation", 1.3, "odometry_slip", "odometry"),
+    ("odometry_scale.rotation", 1.5, "odometry_slip", "too much turn"),
+]
+
+
+@pytest.mark.parametrize(
+    ("name", "level", "kind", "words"), [(None, None, "none", ""), *REPRODUCED]
+)
+def test_the_failure_mode_is_the_perturbation_that_reproduces_it(drive, name, level, kind, words):
+    bundle, truth = drive
+    seed, view, late_s = 1, bundle.view(), 0.0
+    run = run_trial(bundle, Trial(bundle.manifest.bundle_id, "amcl", seed, name, level))
+    if name is not None:
+        what, _, variant = name.partition(".")
+        stream = np.random.SeedSequence([seed, 1])
+        rng = np.random.Generator(np.random.PCG64(stream))
+        view = PERTURBATIONS.load(what)().apply(view, variant, level, rng)
+        late_s = level if what == "scan_delay" else 0.0
+    judgement = judge(view, run.estimate.track, seen_from(view, truth, late_s))
+
+    assert judgement.failure_mode.kind == kind
+    assert words in " ".join(judgement.failure_mode.evidence)
+
+
+def test_a_gap_in_the_recording_alone_is_no_cause(drive):
+    bundle, _ = drive
+    scans = bundle.table("scans")
+    low, high = scans.t_ns[0] + ns(20.0), scans.t_ns[0] + ns(25.0)
+    view = bundle.view().with_table(scans.take((scans.t_ns < low) | (scans.t_ns > high)))
+
+    assert scan_gaps(view, low, high + ns(1.0)) == ()
+    (gap,) = scan_gaps(view, low, high + ns(1.0), recorded=False)
+    assert (gap.end_ns - gap.start_ns) / 1e9 == pytest.approx(5.1, abs=0.11)
+    assert gap.moved_m > 1.0
+
+
+@pytest.mark.parametrize(
+    ("sigma_m", "kind"), [(None, "optimization_drift"), (0.02, "overconfidence")]
+)
+def test_an_error_that_grows_is_drift_or_a_false_trust_in_itself(sigma_m, kind):
+    bundle = synthetic_bundle(seconds=60, with_initial_pose=False)
+    t = (at_scans(bundle) - START_NS) / 1e9
+    path = true_path(t)
+    slid = path + np.outer(np.maximum(t - 5.0, 0.0) * 0.025, [0.6, 0.8, 0.0])
+    belief = PoseTrack.without_covariance("map", "base_link", at_scans(bundle), slid)
+    if sigma_m is not None:
+        belief = replace(belief, cov=np.tile(np.eye(3) * sigma_m**2, (len(t), 1, 1)))
+    judgement = judge(bundle.view(), belief, hindsight_of(bundle))
+
+    assert (judgement.state, judgement.failure_mode.kind) == ("lost", kind)
 
 
 def test_summaries_are_short_and_do_not_contradict_themselves():

@@ -6,13 +6,15 @@ from dataclasses import replace
 
 import numpy as np
 
+from slamreplay.bundle.belief import recorded_belief
 from slamreplay.bundle.findings import Finding
 from slamreplay.bundle.products import Hindsight
 from slamreplay.bundle.track import PoseTrack
 from slamreplay.bundle.view import BundleView
 from slamreplay.verdict.actions import Outcome, actions, risky
+from slamreplay.verdict.case import Case
 from slamreplay.verdict.contract import contract_findings
-from slamreplay.verdict.failure_mode import Case, failure_mode
+from slamreplay.verdict.failure_mode import failure_mode
 from slamreplay.verdict.findings import motion_findings, verdict_findings
 from slamreplay.verdict.intervals import log_state
 from slamreplay.verdict.judgement import FailureMode, Interval, Judgement, State
@@ -118,13 +120,16 @@ def _mode(
         return FailureMode("wrong_map", 0.9, words)
     error = evidence.error
     sigma = np.full(len(error.t_ns), np.nan)
+    own = True
     if belief is not None:
+        told = recorded_belief(view, belief.t_ns)
+        own = told is not None and np.array_equal(told.xyyaw, belief.xyyaw, equal_nan=True)
         cov = belief.at(error.t_ns).cov[:, :2, :2]
         u = (error.belief - error.where)[:, :2]
         u = u / np.maximum(np.hypot(u[:, 0], u[:, 1]), 1e-9)[:, None]
         with np.errstate(invalid="ignore"):
             sigma = np.sqrt(np.einsum("ni,nij,nj->n", u, cov, u))
-    mode = failure_mode(Case(view, error, hindsight, intervals, sigma, limits, delay, turned))
+    mode = failure_mode(Case(view, error, hindsight, intervals, sigma, limits, delay, turned, own))
     if offset is not None and offset.cause == "map_or_start" and mode.kind != "none":
         text = f"a map frame shifted by {offset.text} would explain it equally well"
         mode = replace(mode, confidence=0.5, evidence=(*mode.evidence, text))

@@ -62,7 +62,9 @@ def parting(
     step_a, step_b = se2.between(a, a[ahead]), se2.between(b, b[ahead])
     metres = np.hypot(*(step_a - step_b)[:, :2].T)
     radians = np.abs(se2.wrap_angle(step_a[:, 2] - step_b[:, 2]))
-    bad = (metres > DISAGREE_M) | (radians > DISAGREE_RAD)
+    # Over a gap in the scans a stretch is longer, and calibration errors have longer to add up.
+    longer = np.maximum((t[ahead] - t) / STRETCH_NS, 1.0)
+    bad = (metres > DISAGREE_M * longer) | (radians > DISAGREE_RAD * longer)
     if not bad.any():
         return None
     first = int(np.argmax(bad))
@@ -70,7 +72,7 @@ def parting(
     grown = np.hypot(*(drift[0] - drift[1])[:, :2].T) / DISAGREE_M
     grown = np.maximum(grown, np.abs(se2.wrap_angle((drift[0] - drift[1])[:, 2])) / DISAGREE_RAD)
     begun = int(t[first + int(np.argmax(grown > 0.25 * grown[-1]))])
-    worst = int(np.argmax(np.maximum(metres / DISAGREE_M, radians / DISAGREE_RAD)))
+    worst = int(np.argmax(np.maximum(metres / DISAGREE_M, radians / DISAGREE_RAD) / longer))
     low, high = worst, int(ahead[worst])
     hops = np.hypot(*np.diff(a[low : high + 1, :2], axis=0).T)
     hops_b = np.hypot(*np.diff(b[low : high + 1, :2], axis=0).T)

@@ -104,8 +104,8 @@ def _clauses(
         return [f"{knew}, but the aisle had changed: {changed}", *where]
     if not has_belief:
         return [_UNSPOKEN]
-    late = [mode.evidence[0]] if mode.kind == "timing" and mode.evidence else []
-    return [f"The robot knew where it was{_within(intervals)} and the map was right", *late]
+    also = [mode.evidence[0]] if mode.kind in ("timing", "odometry_slip") and mode.evidence else []
+    return [f"The robot knew where it was{_within(intervals)} and the map was right", *also]
 
 
 def _lost(intervals: Sequence[Interval], start_ns: int) -> str:

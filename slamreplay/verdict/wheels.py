@@ -28,6 +28,8 @@ SLIP_M, SLIP_RAD = 0.15, np.radians(6.0)
 NEAR_NS, LEAST_M, LEAST_RAD = 2 * NS_PER_S, 0.25, np.radians(8.0)
 #: Calibration errors are worth a word from here on.
 SCALE_WORTH, PULL_WORTH_RAD_M = 0.03, np.radians(1.0)
+#: From here on they are a fault of the robot even where its localizer coped.
+SCALE_GROSS, PULL_GROSS_RAD_M = 0.15, np.radians(4.0)
 #: A robot that moved by half a metre while its wheels turned a quarter of that was carried.
 CARRIED_M, CARRIED_SHARE = 0.5, 0.25
 
@@ -93,6 +95,18 @@ class Wheels:
     turn_sigma: float | None
     pull_rad_m: float | None
     slips: tuple[WheelSlip, ...]
+
+    @property
+    def is_gross(self) -> bool:
+        """Whether odometry is off by more than wheels that are merely worn."""
+        scales = ((self.scale, self.scale_sigma), (self.turn_scale, self.turn_sigma))
+        pull = self.pull_rad_m
+        return (pull is not None and abs(pull) > PULL_GROSS_RAD_M) or any(
+            value is not None
+            and sigma is not None
+            and abs(value - 1.0) > max(SCALE_GROSS, 4.0 * sigma)
+            for value, sigma in scales
+        )
 
     @property
     def calibration_words(self) -> tuple[str, ...]:

@@ -22,7 +22,7 @@ BECAUSE = {
     "stale_map_use": "its map was no longer true",
     "overconfidence": "it was too sure of itself",
     "optimization_drift": "small errors added up",
-    "timing": "its clocks disagreed",
+    "timing": "its sensors came late or not at all",
 }
 #: An error of this many of the belief's own standard deviations is one it did not expect.
 BOLD = 3.0
