@@ -276,6 +276,30 @@ def test_a_change_where_the_belief_left_the_truth_comes_before_a_wrong_match():
     assert any("m² appeared" in line for line in changed.failure_mode.evidence)
 
 
+def without_odometry(bundle):
+    view = bundle.view()
+    for name in ("odometry", "transforms"):
+        table = bundle.table(name)
+        static = table["is_static"] if name == "transforms" else np.zeros(len(table), bool)
+        view = view.with_table(table.take(static))
+    return view
+
+
+def test_without_odometry_a_carry_is_seen_and_a_slip_is_not_guessed():
+    bundle = synthetic_bundle(seconds=40, with_initial_pose=False)
+    t = (at_scans(bundle) - START_NS) / 1e9
+    cov = np.tile(np.eye(3) * 1e-4, (len(t), 1, 1))
+    kinds = []
+    for rate, slow in ((3.0, 0.0), (1.0, 0.5)):  # carried while it stood; its wheels slipped
+        real = np.interp(t, [0, 15, 18, 40], [0, 15, 15 + 3 * rate, 37 + 3 * rate - 3])
+        held = np.interp(t, [0, 15, 18, 40], [0, 15, 15 + 3 * slow, 37 + 3 * slow - 3])
+        belief = PoseTrack("map", "base_link", at_scans(bundle), true_path(held), cov)
+        hindsight = hindsight_of(bundle, xyyaw=true_path(real))
+        kinds.append(judge(without_odometry(bundle), belief, hindsight).failure_mode.kind)
+
+    assert kinds == ["kidnapped", "none"]
+
+
 #: What a perturbation does to a log is what the failure mode says was done to it.
 REPRODUCED = [
     ("tf_delay.odometry", 0.3, "timing", "odometry"),
@@ -389,12 +413,7 @@ def test_dead_reckoning_wanders_and_a_localizer_is_pulled_back():
 def test_without_odometry_a_belief_that_does_not_wander_tells_the_map_frame():
     bundle = synthetic_bundle(seconds=60)
     t = at_scans(bundle)
-    tables = [TABLES[name] for name in ("odometry", "transforms")]
-    bare = bundle.view()
-    for schema in tables:
-        table = bundle.table(schema.name)
-        static = table["is_static"] if schema.name == "transforms" else np.zeros(len(table), bool)
-        bare = bare.with_table(table.take(static))
+    bare = without_odometry(bundle)
     truth = true_path((t - START_NS) / 1e9)
     rng = np.random.default_rng(1)
     turn = np.array([1.5, -2.0, 0.05])

@@ -67,10 +67,30 @@ def from_the_start(case: Case, lost: Interval, onset: int) -> Answer | None:
     return "wrong_initial_pose", sure, words
 
 
+def _moved_unseen(case: Case, onset: int) -> Answer | None:
+    """Without odometry: the robot moved while the belief stood still."""
+    error = case.error
+    found = parting(error.t_ns, error.where, error.belief, error.known, onset)
+    if found is None or found.moved_m < CARRIED_M:
+        return None
+    if found.other_m >= CARRIED_SHARE * found.moved_m:
+        return None
+    text = (
+        f"from {case.seconds(found.start_ns)} on the robot moved {found.moved_m:.2f} m within "
+        f"{(error.t_ns[found.end] - error.t_ns[found.start]) / NS_PER_S:.1f} s and the belief "
+        f"{found.other_m:.2f} m: it was carried, or its localizer was silent"
+    )
+    return "kidnapped", 0.6, [text]
+
+
 def was_set(case: Case, onset: int) -> Answer | None:
     """Somebody set a pose, and it was a wrong one."""
-    resets = case.resets(onset)
+    resets, error = case.resets(onset), case.error
     if not len(resets):
+        return None
+    # What was right for a second after somebody set it went wrong by something else.
+    after = error.known & (error.t_ns > resets[0]) & (error.t_ns <= resets[0] + NS_PER_S)
+    if onset > resets[0] + NS_PER_S and after.any() and not error.off(case.limits)[after].any():
         return None
     text = (
         f"a pose was set at {case.seconds(int(resets[0]))} and the belief left the truth at "
@@ -83,7 +103,7 @@ def moved_otherwise(case: Case, onset: int) -> Answer | None:
     """Hindsight against odometry: slip, or carried."""
     error, odom = case.error, case.odometry()
     if odom is None:
-        return None
+        return _moved_unseen(case, onset)
     found = parting(error.t_ns, error.where, odom, error.known, onset)
     if found is None:
         return None
@@ -167,8 +187,10 @@ def uncalibrated(case: Case, onset: int) -> Answer | None:
     return "odometry_slip", 0.6, [*words, text]
 
 
-def sure_of_itself(case: Case, onset: int) -> Answer:
+def sure_of_itself(case: Case, onset: int) -> Answer | None:
     """Small errors of odometry that an honest covariance would have let the scans take out."""
+    if case.odometry() is None:
+        return None  # a slip would look the same
     text = f"the belief left the truth at {case.seconds(onset)} without a jump, sure of itself"
     words = () if case.wheels is None else case.wheels.calibration_words
     return "overconfidence", 0.7, [text, *words]
@@ -177,6 +199,8 @@ def sure_of_itself(case: Case, onset: int) -> Answer:
 def drifted(case: Case, lost: Interval, onset: int) -> Answer | None:
     """An error that grew all along, with nothing that pushed it."""
     error = case.error
+    if case.odometry() is None:
+        return None
     rows = np.flatnonzero(error.known & np.isfinite(error.distance_m) & (error.t_ns <= onset))
     if len(rows) < 10 or (error.t_ns[rows[-1]] - error.t_ns[rows[0]]) < LASTING_NS:
         return None
