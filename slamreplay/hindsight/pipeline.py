@@ -105,7 +105,7 @@ def _rebuilt(
     if matched is not None:
         motion, each = matched, [beams_of(laser, matched) for laser in lasers]
         beams = _beside(each, motion)
-        points = [beams.points(k) for k in keys]
+        points, chain = _chained(beams, odometry, keys, is_unknown)
     found = submaps(chain, points, beams.laser_xy)
     if not found:
         return _nowhere(grid.frame_id, base, beams)
