@@ -8,10 +8,20 @@ import pytest
 from slamreplay.bundle.track import PoseTrack
 from slamreplay.geometry import se2
 from slamreplay.hindsight.beams import HIT, INVALID, MISS, Beams, interleaved, side_by_side
+from slamreplay.hindsight.chain import Chain
 from slamreplay.hindsight.changes import find_changes
 from slamreplay.hindsight.keyframes import keyframes, with_more
 from slamreplay.hindsight.pipeline import motion_by_scans
-from slamreplay.hindsight.places import JUMP_DOUBTFUL, JUMP_SOLID, Hypotheses, best_places
+from slamreplay.hindsight.places import (
+    JUMP_DOUBTFUL,
+    JUMP_SOLID,
+    WEIGHT,
+    Hypotheses,
+    Places,
+    best_places,
+)
+from slamreplay.hindsight.submaps import Submap
+from slamreplay.hindsight.trust import keyframe_leads, trusted_keyframes
 from slamreplay.maps.grid import OccupancyGrid
 from slamreplay.maps.raycast import cast_rays
 from slamreplay.matching.field import working_map
@@ -57,6 +67,28 @@ def test_without_another_place_there_is_no_margin():
 
     assert found.margin is None
     assert np.isinf(found.doubt).all()
+
+
+def two_submaps(second_lead: float) -> tuple[Places, list[Submap]]:
+    poses = np.zeros((2, 3))
+    doubt = WEIGHT * np.array([0.5, second_lead])
+    places = Places(np.zeros(2, int), poses, np.full(2, 0.9), np.zeros(1, bool), 0.3, doubt)
+    empty = np.empty((0, 2))
+    return places, [Submap(0, 6, 3, empty, empty), Submap(6, 10, 8, empty, empty)]
+
+
+@pytest.mark.parametrize(("second_lead", "known"), [(0.2, 10), (0.05, 6)])
+def test_stretch_without_a_lead_over_other_places_is_not_placed(second_lead, known):
+    places, found = two_submaps(second_lead)
+    lead = keyframe_leads(places, found, 10)
+    sure, ones = np.ones(10, bool), np.ones(10)
+    chain = Chain(np.zeros((10, 3)), ones, ~sure, sure, np.zeros((10, 3, 3)))
+    cov = np.broadcast_to(np.eye(3) * 1e-4, (10, 3, 3))
+
+    trusted = trusted_keyframes(places, chain, np.zeros(9, bool), cov, ones, lead)
+
+    np.testing.assert_allclose(lead, [0.5] * 6 + [second_lead] * 4)
+    assert trusted.tolist() == [True] * known + [False] * (10 - known)
 
 
 def hall() -> OccupancyGrid:

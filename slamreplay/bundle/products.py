@@ -76,6 +76,9 @@ class Hindsight:
             per scan; None where no different one was found.
         changes: what contradicts the map, seen from this trajectory.
         joined: sightings and fixes that it was made of beside scans and odometry, by kind.
+        lead: (N,) by how much the place of the stretch around each scan beats the best different
+            one, in mean score of that stretch; inf where there is no different one, empty where it
+            was not asked. The margin is about the whole log, this about one moment.
     """
 
     track: PoseTrack
@@ -85,3 +88,4 @@ class Hindsight:
     margin: float | None
     changes: Changes | None
     joined: Mapping[str, int] = field(default_factory=lambda: MappingProxyType({}))
+    lead: se2.Array = field(default_factory=lambda: np.empty(0))

@@ -34,7 +34,7 @@ from slamreplay.hindsight.seating import seat_keyframes
 from slamreplay.hindsight.sensed import sensed
 from slamreplay.hindsight.smoothing import smooth
 from slamreplay.hindsight.submaps import Submap, submaps
-from slamreplay.hindsight.trust import trusted_keyframes
+from slamreplay.hindsight.trust import keyframe_leads, trusted_keyframes
 from slamreplay.hindsight.witnessed import witnessed_places
 from slamreplay.maps.grid import OccupancyGrid
 from slamreplay.matching.field import ScoreField, WorkingMap, working_map
@@ -135,7 +135,8 @@ def _rebuilt(
         poses, cov = smooth(field, points, again[0], chain, again[1], other)
         is_open, key_scores = again[1], scan_scores(field, key_beams, poses)
     say("every scan", 0.8)
-    trusted = trusted_keyframes(places, chain, is_open, cov, key_scores)
+    lead = keyframe_leads(places, found, len(keys))
+    trusted = trusted_keyframes(places, chain, is_open, cov, key_scores, lead)
     carried, share, doubt = carry(odometry, keys, poses, is_open, beams, field)
     carried, scan_cov = settle(carried, cov[share], odometry, keys[share], doubt, beams, field)
     carried[~trusted[share]], scan_cov[~trusted[share]] = np.nan, np.nan
@@ -156,6 +157,7 @@ def _rebuilt(
         places.margin,
         changes,
         {} if other is None else other.joined(),
+        lead[share],
     )
 
 

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
 from slamreplay.geometry import se2
 from slamreplay.hindsight.chain import Chain
-from slamreplay.hindsight.places import Places
+from slamreplay.hindsight.places import WEIGHT, Places
+from slamreplay.hindsight.submaps import Submap, owners
 
 #: A log of which the typical submap fits worse than this, and no place stands out by more than
 #: that, is not in this map. Logs laid onto foreign maps reached 0.55 and 0.075, logs in their own
@@ -17,6 +20,10 @@ FITS_SCORE, FITS_MARGIN = 0.6, 0.1
 STRETCH_SCORE = 0.4
 #: Beyond this standard deviation a pose is no pose.
 SIGMA_MAX_M = 0.5
+#: A stretch whose place leads the best different one by less than this, in mean score of its
+#: submap, is not placed. Over 1255 submaps of simulated logs the three that were wrong led by at
+#: most 0.082 and the right ones by 0.10 or more (one: 0.103).
+LEAD_SCORE = 0.085
 
 
 def fits_map(places: Places) -> bool:
@@ -32,6 +39,7 @@ def trusted_keyframes(
     is_open: NDArray[np.bool_],
     cov: se2.Array,
     score: se2.Array,
+    lead: se2.Array,
 ) -> NDArray[np.bool_]:
     """(K,) keyframes whose pose can be believed.
 
@@ -41,6 +49,7 @@ def trusted_keyframes(
         is_open: (K - 1,) links over which the motion is not known.
         cov: (K, 3, 3) of the poses, m^2 and rad^2.
         score: (K,) of each keyframe's scan in the map at its pose.
+        lead: (K,) of each keyframe's place over the best different one, see `keyframe_leads`.
     """
     if not fits_map(places):
         return np.zeros(len(score), dtype=bool)
@@ -49,4 +58,17 @@ def trusted_keyframes(
     scored = np.where(np.isfinite(score), score, 0.0)
     mean = np.bincount(stretch, weights=scored) / np.bincount(stretch)
     sigma = np.sqrt(np.linalg.eigvalsh(cov[:, :2, :2])[:, -1])
-    return np.asarray((mean[stretch] >= STRETCH_SCORE) & (sigma <= SIGMA_MAX_M))
+    placed = (mean[stretch] >= STRETCH_SCORE) & (sigma <= SIGMA_MAX_M)
+    leads = lead >= LEAD_SCORE
+    # Where most of the log has no lead it is the log that is ambiguous, and its margin says so.
+    return np.asarray(placed & leads if 2 * np.count_nonzero(leads) > len(leads) else placed)
+
+
+def keyframe_leads(places: Places, found: Sequence[Submap], count: int) -> se2.Array:
+    """(count,) how far the place of each keyframe's submap leads the best different one.
+
+    The best sequence of places against the best one that differs at this submap, in mean score of
+    this one submap (0 to 1); inf where there is no different place. 0 for keyframes of no submap.
+    """
+    owner = owners(found, count)
+    return np.where(owner >= 0, (places.doubt / WEIGHT)[np.maximum(owner, 0)], 0.0)
