@@ -171,8 +171,9 @@ def row(what: str, injection: Injection, log: Recorded) -> Row:
 
 
 def scored(t_ns: NDArray[np.int64], true: Flags, said: Flags, counted: Flags) -> Score:
-    """Moments compared; those near a true edge or not counted are left out."""
-    edges = t_ns[np.flatnonzero(true[1:] != true[:-1]) + 1]
+    """Moments compared; those near an edge of the truth or of what is counted are left out."""
+    changes = (true[1:] != true[:-1]) | (counted[1:] != counted[:-1])
+    edges = t_ns[np.flatnonzero(changes) + 1]
     near = np.zeros(len(t_ns), dtype=bool)
     for edge in edges:
         near |= np.abs(t_ns - edge) <= ns(_EDGE_S)
