@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slamreplay.geometry import se2
+from slamreplay.hindsight.weighing import weighed
 from slamreplay.matching.correlative import Match, Window, match, search_window
 from slamreplay.matching.field import WORKING_RESOLUTION_M, ScoreField, points_field
 from slamreplay.matching.thinning import thin
@@ -89,6 +90,8 @@ def scan_matched(
             poor |= odometry is not None and laid.score < GOOD and not _agree(guess, laid.xyyaw)
             is_break[k] = poor
             xyyaw[k] = guess if is_break[k] else laid.xyyaw
+            if odometry is not None and not is_break[k]:
+                xyyaw[k] = weighed(guess, laid, se2.between(last, guess), len(scan), SIGMA_M)
         if is_break[k]:
             memory = []
         # Without odometry the scans come at sensor rate: what hardly moved adds nothing.
