@@ -228,7 +228,9 @@ def test_matching_no_points_stays_where_it_is():
     assert found.xyyaw[:2] == pytest.approx([1.0, 1.0], abs=0.2)
 
 
-def test_lattice_scores_equal_their_plain_sum():
+@pytest.mark.parametrize("threads", [1, 2, 3])
+def test_lattice_scores_equal_their_plain_sum(monkeypatch, threads):
+    monkeypatch.setattr(numba.config, "NUMBA_NUM_THREADS", threads)
     coarse = RNG.integers(0, 251, (9, 11)).astype(np.uint8)
     cells = RNG.uniform(-3.0, 3.0, (10, 2))
     headings = np.arange(16) * (np.pi / 8.0)

@@ -20,6 +20,7 @@ from scipy.ndimage import distance_transform_edt, maximum_filter
 from slamreplay.geometry import se2
 from slamreplay.matching.correlative import Window, match_each
 from slamreplay.matching.field import ScoreField, WorkingMap
+from slamreplay.matching.threads import share_out
 
 #: uint16 sums of bytes up to 250 hold 262 points.
 MAX_POINTS = 260
@@ -139,14 +140,21 @@ def _score_lattice(
     height, width = padded.shape[0] - 2 * reach, padded.shape[1] - 2 * reach
     best = np.zeros((len(headings) // per_sector, height, width), dtype=np.uint16)
     which = np.zeros(best.shape, dtype=np.uint8)
-    total = np.zeros(width, dtype=np.uint16)
-    offset = np.zeros(len(cells), dtype=np.int64)
     flat, padded_width = padded.ravel(), padded.shape[1]
-    _add_rows(flat, padded_width, reach, cells, headings, per_sector, best, which, total, offset)
+
+    def work(first: int, stop: int) -> None:
+        """The sectors from `first` to before `stop`."""
+        some = headings[first * per_sector : stop * per_sector]
+        total = np.zeros(width, dtype=np.uint16)
+        offset = np.zeros(len(cells), dtype=np.int64)
+        out = best[first:stop], which[first:stop]
+        _add_rows(flat, padded_width, reach, cells, some, per_sector, *out, total, offset)
+
+    share_out(len(best), work)
     return best, which
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _add_rows(  # type: ignore[no-untyped-def]  # noqa: C901
     flat, padded_width, reach, cells, headings, per_sector, best, which, total, offset
 ):
