@@ -150,7 +150,7 @@ def _seen(
     view: BundleView, scans: ScanSet, hindsight: Hindsight, rows: NDArray[np.int64]
 ) -> se2.Array:
     """(M,) headings at which the scans fit the map best, unwrapped; NaN where they fit nowhere."""
-    from slamreplay.matching.correlative import Window, match
+    from slamreplay.matching.correlative import Window, match_each
     from slamreplay.matching.field import working_map
     from slamreplay.matching.thinning import thin
 
@@ -162,13 +162,12 @@ def _seen(
     window = Window(0.1, 0.05, 0.36, 0.03, pull=0.02)
     where = hindsight.track.at(scans.t_ns[rows]).xyyaw
     here = se2.compose(se2.inverse(working.origin_xyyaw), where)
-    for k, row in enumerate(rows.tolist()):
-        points = thin(scans.points(row), 0.1)
-        if len(points) < 20 or not np.isfinite(here[k]).all():
-            continue
-        top = match(field, points, here[k], window)
-        if top.score > 0.4 and np.hypot(*(top.xyyaw - here[k])[:2]) < 0.3:
-            out[k] = top.xyyaw[2] + working.origin_xyyaw[2]
+    asked = np.flatnonzero(np.isfinite(here).all(axis=1))
+    clouds = [thin(scans.points(row), 0.1) for row in rows[asked].tolist()]
+    tops = match_each(field, clouds, here[asked], window)
+    near = np.hypot(*(tops.xyyaw - here[asked])[:, :2].T) < 0.3
+    fits = near & (tops.score > 0.4) & (np.array([len(c) for c in clouds]) >= 20)
+    out[asked[fits]] = tops.xyyaw[fits, 2] + working.origin_xyyaw[2]
     known = np.isfinite(out)
     out[known] = np.unwrap(out[known])
     return out
