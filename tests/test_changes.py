@@ -3,6 +3,7 @@
 import io
 import json
 
+import numba
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
@@ -15,7 +16,9 @@ from slamreplay.bundle.store import write_bundle
 from slamreplay.cli import report
 from slamreplay.errors import OutputError
 from slamreplay.hindsight.beams import HIT, MISS, Beams
+from slamreplay.hindsight.changed_beams import on_map
 from slamreplay.hindsight.changes import find_changes
+from slamreplay.hindsight.evidence import bins_of_each, lattice, marks, passes
 from slamreplay.hindsight.occupancy import taken
 from slamreplay.maps.grid import OccupancyGrid
 from slamreplay.maps.map_server import map_files, read_map
@@ -294,3 +297,56 @@ def test_report_writes_the_corrected_map_and_the_freshness_layer(tmp_path):
     np.testing.assert_array_equal(new.cells, room_grid().cells)  # nothing had changed
     np.testing.assert_allclose(new.origin_xyyaw, room_grid().origin_xyyaw)
     assert pq.read_table(tmp_path / "r" / "freshness.parquet").num_rows > 1000
+
+
+def turning_beams(scans: int) -> tuple[Beams, np.ndarray]:
+    """Scans of the hall from places along a line, two out of ten without a return."""
+    rng = np.random.Generator(np.random.PCG64(8))
+    poses = np.linspace([2.0, 2.0, 0.0], [7.0, 5.0, 2.0], scans)
+    reach = rng.uniform(0.5, 8.0, (scans, len(BEARINGS)))
+    ends = np.stack([reach * np.cos(BEARINGS), reach * np.sin(BEARINGS)], axis=-1)
+    kind = np.where(rng.random(reach.shape) < 0.2, MISS, HIT).astype(np.int8)
+    poses[5] = np.nan
+    return Beams(np.arange(scans) * S // 10, ends.astype(np.float32), kind, np.zeros(2)), poses
+
+
+def test_threads_change_nothing(monkeypatch):
+    beams, poses = turning_beams(700)
+    working = working_map(hall())
+    found = []
+
+    for threads in (1, 2, 3):
+        monkeypatch.setattr(numba.config, "NUMBA_NUM_THREADS", threads)
+        laid = on_map(working, beams, poses)
+        where = lattice(working, beams.t_ns)
+        slots = np.arange(where.shape[0] * where.shape[1], dtype=np.int32).reshape(where.shape)
+        passed = passes(where, beams, poses, 6.0, slots, slots.size)
+        arrays = (laid.says, laid.where, laid.is_sure, laid.wall_m)
+        arrays += (passed.through, passed.last, passed.bin_count)
+        found.append([a.tobytes() for a in arrays])
+
+    assert (passed.bin_count == passed.through.sum(axis=1).reshape(where.shape)).all()
+    assert found[1] == found[0]
+    assert found[2] == found[0]
+
+
+def test_marks_and_counts_of_bins_equal_their_plain_twins():
+    rng = np.random.Generator(np.random.PCG64(9))
+    where = lattice(working_map(hall()), np.arange(100) * S // 4)
+    cells = rng.integers(0, 60, 500) * where.shape[1] + rng.integers(0, 30, 500)
+    bins = np.sort(rng.integers(0, where.bin_count, 500)).astype(np.int32)
+    slots = np.full(where.shape, -1, dtype=np.int32)
+    slots[:40, :25] = np.arange(1000).reshape(40, 25)
+
+    count = np.zeros(where.shape, dtype=np.int64)
+    for cell, _ in set(zip(cells.tolist(), bins.tolist(), strict=True)):
+        count.ravel()[cell] += 1
+    seen = np.zeros((1000, where.bin_count), dtype=bool)
+    for cell, b in zip(cells.tolist(), bins.tolist(), strict=True):
+        row, col = divmod(cell, where.shape[1])
+        for r, c in ((0, 0), (0, 1), (0, -1), (1, 0), (-1, 0), (1, 1), (1, -1), (-1, 1), (-1, -1)):
+            if 0 <= row + r < 40 and 0 <= col + c < 25:
+                seen[slots[row + r, col + c], b] = True
+
+    np.testing.assert_array_equal(bins_of_each(where, cells, bins), count)
+    np.testing.assert_array_equal(marks(where, cells, bins, slots, 1, 1000), seen)

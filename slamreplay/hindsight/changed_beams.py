@@ -11,12 +11,15 @@ from numpy.typing import NDArray
 from slamreplay.geometry import se2
 from slamreplay.hindsight.beams import HIT, INVALID, Beams
 from slamreplay.matching.field import WorkingMap
+from slamreplay.matching.threads import share_out
 
 #: What a beam says: nothing, that its wall is there, that something is before it, that it is gone.
 SILENT, MET, NEARER, BEYOND = 0, 1, 2, 3
 #: A beam has changed, and structure is elsewhere, beyond this distance.
 BEYOND_M = 0.25
 _WALL, _UNKNOWN = 1, 2
+#: So many scans are worth a thread of their own.
+_WORTH_A_THREAD = 100
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,21 +55,27 @@ def on_map(working: WorkingMap, beams: Beams, poses: se2.Array) -> BeamsOnMap:
     where = np.full(beams.kind.shape, -1, dtype=np.int32)
     is_sure = np.zeros(beams.kind.shape, dtype=bool)
     wall_m = np.full(beams.kind.shape, np.nan, dtype=np.float32)
-    _lay_over(
-        cells,
-        working.resolution_m,
-        working.corner_xy,
-        beams.ends,
-        beams.kind,
-        beams.laser_xy,
-        np.ascontiguousarray(poses),
-        BEYOND_M / working.resolution_m,
-        (says, where, is_sure, wall_m),
-    )
+    poses = np.ascontiguousarray(poses)
+    out = (says, where, is_sure, wall_m)
+
+    def work(first: int, stop: int) -> None:
+        _lay_over(
+            cells,
+            working.resolution_m,
+            working.corner_xy,
+            beams.ends[first:stop],
+            beams.kind[first:stop],
+            beams.laser_xy,
+            poses[first:stop],
+            BEYOND_M / working.resolution_m,
+            tuple(values[first:stop] for values in out),
+        )
+
+    share_out(len(poses), work, _WORTH_A_THREAD)
     return BeamsOnMap(says, where, is_sure, wall_m)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _lay_over(  # type: ignore[no-untyped-def]  # noqa: C901
     cells, cell, corner, ends, kind, laser, poses, beyond, out
 ):
@@ -118,7 +127,7 @@ def _lay_over(  # type: ignore[no-untyped-def]  # noqa: C901
                     is_sure[s, b] = False
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _to_wall(cells, x, y, dx, dy, limit, seam):  # type: ignore[no-untyped-def]
     """Distance in cells to the first wall, inf where none is within `limit`, -1 if unmapped first.
 

@@ -11,10 +11,13 @@ from numpy.typing import NDArray
 from slamreplay.geometry import se2
 from slamreplay.hindsight.beams import INVALID, MISS, Beams
 from slamreplay.matching.field import WorkingMap
+from slamreplay.matching.threads import share_out
 
 CELL_M, BIN_S = 0.1, 0.5
 #: A pass counts up to this distance before the beam's end: noise puts ends short.
 SHORT_M = 0.2
+#: So many bins are worth a thread of their own.
+_WORTH_A_THREAD = 50
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,23 +83,48 @@ def marks(
         radius: in cells, 0 for the cell alone.
         count: how many are asked for.
     """
-    total = where.bin_count
-    out = np.zeros((count, total), dtype=bool)
-    flat = np.unique(cells * total + bins)
-    _spread(out, flat // total, flat % total, slots, radius)
+    out = np.zeros((count, where.bin_count), dtype=bool)
+    _spread(out, cells, bins, slots, radius, np.full(slots.shape, -1, dtype=np.int32))
     return out
 
 
 @njit(cache=True)
-def _spread(out, cells, bins, slots, radius):  # type: ignore[no-untyped-def]
+def _spread(out, cells, bins, slots, radius, done):  # type: ignore[no-untyped-def]
     height, width = slots.shape
     for k in range(cells.shape[0]):
         row, col = cells[k] // width, cells[k] % width
+        # Many beams of one bin end in one cell.
+        if done[row, col] == bins[k]:
+            continue
+        done[row, col] = bins[k]
         for r in range(max(0, row - radius), min(height, row + radius + 1)):
             for c in range(max(0, col - radius), min(width, col + radius + 1)):
                 far = (r - row) * (r - row) + (c - col) * (c - col)
                 if slots[r, c] >= 0 and far <= radius * radius + radius:
                     out[slots[r, c], bins[k]] = True
+
+
+def bins_of_each(
+    where: Lattice, cells: NDArray[np.int64], bins: NDArray[np.int32]
+) -> NDArray[np.int64]:
+    """(H, W) in how many different bins each cell was named.
+
+    Args:
+        where: the lattice.
+        cells: (K,) flat cells.
+        bins: (K,) when each was, ascending.
+    """
+    count = np.zeros(where.shape, dtype=np.int64)
+    _count_bins(cells, bins, count.ravel(), np.full(count.size, -1, dtype=np.int32))
+    return count
+
+
+@njit(cache=True)
+def _count_bins(cells, bins, count, last):  # type: ignore[no-untyped-def]
+    for k in range(cells.shape[0]):
+        if last[cells[k]] != bins[k]:
+            last[cells[k]] = bins[k]
+            count[cells[k]] += 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,31 +161,45 @@ def passes(
         count: how many are asked for.
     """
     through = np.zeros((count, where.bin_count), dtype=bool)
-    last = np.full(where.shape, -1, dtype=np.int32)
-    last_bin = np.full(where.shape, -1, dtype=np.int32)
-    bin_count = np.zeros(where.shape, dtype=np.uint16)
-    _passes(
-        where.cell_m,
-        where.corner_xy,
-        where.bins,
-        beams.ends,
-        beams.kind,
-        beams.laser_xy,
-        np.ascontiguousarray(poses),
-        reach_m / where.cell_m,
-        slots,
-        (through, last, last_bin, bin_count),
-    )
+    poses = np.ascontiguousarray(poses)
+    parts: dict[int, tuple[NDArray[np.int32], NDArray[np.uint16]]] = {}
+
+    def work(first: int, stop: int) -> None:
+        """The bins from `first` to before `stop`: no bin is anybody else's."""
+        last = np.full(where.shape, -1, dtype=np.int32)
+        last_bin = np.full(where.shape, -1, dtype=np.int32)
+        bin_count = np.zeros(where.shape, dtype=np.uint16)
+        low, high = np.searchsorted(where.bins, [first, stop]).tolist()
+        _passes(
+            where.cell_m,
+            where.corner_xy,
+            where.bins,
+            beams.ends,
+            beams.kind,
+            beams.laser_xy,
+            poses,
+            reach_m / where.cell_m,
+            slots,
+            (low, high),
+            (through, last, last_bin, bin_count),
+        )
+        parts[first] = last, bin_count
+
+    share_out(where.bin_count, work, _WORTH_A_THREAD)
+    last, bin_count = parts.pop(0)
+    for later, more in parts.values():
+        np.maximum(last, later, out=last)
+        bin_count += more
     return Passes(through, last, bin_count)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _passes(  # type: ignore[no-untyped-def]  # noqa: C901
-    cell, corner, bins, ends, kind, laser, poses, reach, slots, out
+    cell, corner, bins, ends, kind, laser, poses, reach, slots, scans, out
 ):
     through, last, last_bin, bin_count = out
     height, width = last.shape
-    for s in range(poses.shape[0]):
+    for s in range(scans[0], scans[1]):
         if not np.isfinite(poses[s, 0]):
             continue
         cos, sin, now = np.cos(poses[s, 2]), np.sin(poses[s, 2]), bins[s]

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import label
 
 from slamreplay.hindsight.changed_beams import NEARER, BeamsOnMap
-from slamreplay.hindsight.evidence import BIN_S, Lattice, marks
+from slamreplay.hindsight.evidence import BIN_S, Lattice, bins_of_each, marks
 from slamreplay.hindsight.occupancy import taken
 
 #: Standing: seen at one place for this long in all.
@@ -55,10 +55,7 @@ def asked_cells(where: Lattice, on_map: BeamsOnMap) -> tuple[NDArray[np.int32], 
     """(H, W) numbers of the cells worth following over time: something new was seen there twice."""
     scan, beam = np.nonzero(on_map.says == NEARER)
     cells = where.cells_of(on_map.where[scan, beam])
-    total = max(where.bin_count, 1)
-    bins = np.unique(cells * total + where.bins[scan])
-    count = np.bincount(bins // total, minlength=where.shape[0] * where.shape[1])
-    count = count.reshape(where.shape)
+    count = bins_of_each(where, cells, where.bins[scan])
     padded = np.pad(count, 1)
     height, width = where.shape
     around = sum(
