@@ -374,6 +374,24 @@ def test_summaries_are_short_and_do_not_contradict_themselves():
     assert "1.9" not in told.summary
 
 
+@pytest.mark.parametrize("lost", [False, True])
+def test_a_map_of_which_most_is_contradicted_is_weak_evidence(lost):
+    offset = (1.0, 0.5, 0.0) if lost else (0.0, 0.0, 0.0)
+    bundle = synthetic_bundle(belief_offset_xyyaw=offset, offset_from_s=8.0)
+    told = judged(bundle, hindsight_of(bundle, shares=shares_between(bundle, 5, 15, 0.6)))
+    less = judged(bundle, hindsight_of(bundle, shares=shares_between(bundle, 5, 15, 0.3)))
+    version = bundle.view().grid.version
+    held = rows("map_updates", [0.0], map_version=[version], frame_id=["map"])
+    view = bundle.view().with_table(held)
+    hindsight = hindsight_of(bundle, shares=shares_between(bundle, 5, 15, 0.6))
+    own = judge(view, recorded_belief(view, at_scans(bundle)), hindsight)
+
+    assert "weak evidence: 60 % of the beams differ" in told.summary
+    assert len(told.summary) <= MOST_CHARACTERS
+    assert "weak evidence" not in less.summary
+    assert "weak evidence" not in own.summary
+
+
 def test_a_localizer_that_follows_the_truth_beside_it_has_another_map_frame():
     bundle = synthetic_bundle(seconds=25)
     t = at_scans(bundle)

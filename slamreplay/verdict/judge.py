@@ -25,6 +25,7 @@ from slamreplay.verdict.stops import stop_findings, stops
 from slamreplay.verdict.summary import summary
 from slamreplay.verdict.tiles import Evidence, gathered, intervals_of
 from slamreplay.verdict.timing import Delay, scan_delay
+from slamreplay.verdict.weak_evidence import doubt_of_map
 from slamreplay.verdict.wheels import Wheels, wheels
 
 _DEFAULT = Limits()
@@ -66,6 +67,9 @@ def judge(
     found_stops = stops(view, belief, hindsight.track, intervals, mode)
     done = actions(view, belief, limits, Outcome(evidence.error, intervals))
     reason = "hindsight does not know where it was for most of the log"
+    doubt = doubt_of_map(view, evidence.changes, evidence.offset, limits)
+    if doubt is not None and mode.kind == "stale_map_use":
+        mode = replace(mode, evidence=(*mode.evidence, doubt))
     text = summary(
         state,
         intervals,
@@ -76,6 +80,7 @@ def judge(
         start_ns=view.manifest.start_ns,
         has_belief=belief is not None,
         reason=reason,
+        doubt=doubt,
     )
     findings = (
         *verdict_findings(view, belief, hindsight, intervals, evidence.offset, limits),

@@ -34,6 +34,7 @@ def summary(
     start_ns: int,
     has_belief: bool,
     reason: str | None,
+    doubt: str | None = None,
 ) -> str:
     """The sentence, of at most `MOST_CHARACTERS`: clauses that do not fit are left out.
 
@@ -47,12 +48,24 @@ def summary(
         start_ns: the log's start; times in the sentence count from it.
         has_belief: whether a localizer spoke at all.
         reason: why nothing could be judged, where that is so.
+        doubt: that so much of the map is contradicted that it may not be the robot's.
     """
     clauses = _clauses(
-        state, intervals, mode, changes, offset, start_ns, has_belief=has_belief, reason=reason
+        state,
+        intervals,
+        # The cause gives way to the doubt: there is no room for both.
+        FailureMode("none", None, ()) if doubt and state == "lost_and_map_changed" else mode,
+        changes,
+        offset,
+        start_ns,
+        has_belief=has_belief,
+        reason=reason,
     )
+    tells_of_map = state in ("map_changed", "lost_and_map_changed")
+    if doubt is not None and tells_of_map:
+        clauses.insert(1, doubt)
     if stops and state not in ("insufficient_data", "unobservable"):
-        clauses.insert(1, _stopped(stops, start_ns))
+        clauses.insert(2 if doubt is not None and tells_of_map else 1, _stopped(stops, start_ns))
     text = clauses[0]
     for clause in clauses[1:]:
         if len(text) + len(clause) + 3 <= MOST_CHARACTERS:
