@@ -20,11 +20,12 @@ from slamreplay.hindsight.places import (
     Places,
     best_places,
 )
+from slamreplay.hindsight.smoothing import floor_covariance
 from slamreplay.hindsight.submaps import Submap
 from slamreplay.hindsight.trust import keyframe_leads, trusted_keyframes
 from slamreplay.maps.grid import OccupancyGrid
 from slamreplay.maps.raycast import cast_rays
-from slamreplay.matching.field import working_map
+from slamreplay.matching.field import ScoreField, working_map
 
 MOTION = np.array([[1.0, 0.0, 0.0]])
 
@@ -89,6 +90,17 @@ def test_stretch_without_a_lead_over_other_places_is_not_placed(second_lead, kno
 
     np.testing.assert_allclose(lead, [0.5] * 6 + [second_lead] * 4)
     assert trusted.tolist() == [True] * known + [False] * (10 - known)
+
+
+def test_pose_is_no_better_than_the_map_is_drawn():
+    sigma_m = [
+        np.sqrt(
+            floor_covariance(ScoreField(np.zeros((2, 2), np.float32), cell_m, np.zeros(2)))[0, 0]
+        )
+        for cell_m in (0.02, 0.05, 0.1)
+    ]
+
+    np.testing.assert_allclose(sigma_m, [0.008, 0.008, 0.0286], atol=1e-3)
 
 
 def hall() -> OccupancyGrid:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from slamreplay.geometry import se2
 from slamreplay.hindsight.beams import HIT, Beams
 from slamreplay.hindsight.keyframes import MIN_POINTS
-from slamreplay.hindsight.smoothing import MIN_SCORE, match_covariance
+from slamreplay.hindsight.smoothing import MIN_SCORE, floor_covariance, match_covariance
 from slamreplay.hindsight.way import between_keyframes
 from slamreplay.matching.correlative import Window, match_each
 from slamreplay.matching.field import ScoreField
@@ -90,7 +90,9 @@ def settle(
     sigma = np.stack([sigma_m, sigma_m, 0.005 + 0.4 * np.abs(way[:, 2])], axis=1)
     sigma = np.hypot(sigma, doubt)
     is_wide = np.any(doubt > np.array([0.08, 0.08, 0.06]), axis=1)
-    poses, spread = carried.copy(), cov.copy()
+    # What the map is off by is the same for both: it is set aside, or two of them would better it.
+    floor = floor_covariance(field)
+    poses, spread = carried.copy(), cov - floor
     moved = np.flatnonzero(np.isfinite(carried).all(axis=1) & (near != np.arange(len(near))))
     spread[moved] += sigma[moved, :, None] ** 2 * np.eye(3)
     for first in range(0, len(moved), _AT_ONCE):
@@ -110,7 +112,7 @@ def settle(
         gain = prior @ np.linalg.inv(prior + measured)
         poses[held] = carried[held] + np.einsum("nij,nj->ni", gain, off)
         spread[held] = prior - gain @ prior
-    return poses, 0.5 * (spread + np.swapaxes(spread, 1, 2))
+    return poses, 0.5 * (spread + np.swapaxes(spread, 1, 2)) + floor
 
 
 def scan_scores(field: ScoreField, beams: Beams, poses: se2.Array) -> se2.Array:

@@ -24,13 +24,16 @@ WINDOWS = (
 MIN_SCORE = 0.3
 #: Neighbouring keyframes match the same walls with the same errors of the map: about this many
 #: anchors say one thing, so each is given that much more variance. Chosen by hand: with it and
-#: the floor the mean NEES of simulated logs was 0.7 to 1.8 (3 is right), but far above 3 where the
-#: robot was carried, and 5 on a map of 10 cm: there the covariance is too narrow.
+#: the floors below the mean NEES of simulated logs is 0.7 to 3 (3 is right), 10 cm maps and carried
+#: robots included. Above that: short-ranged lasers among moved racks.
 SAME_EVIDENCE = 3.0
 #: Mean score from which on a match is taken at its word.
 DOUBT_BELOW = 0.75
 #: What a map and a scanner leave in any match: metres, metres, radians.
 FLOOR = np.array([0.008, 0.008, 0.0015])
+#: A wall lies anywhere in its cells, and all beams on it are off by the same. Cells up to FINE_M
+#: add nothing that could be measured, cells of 0.1 m add 0.027 m.
+FINE_M, COARSE = 0.05, 0.55
 
 
 def smooth(
@@ -55,7 +58,8 @@ def smooth(
     motions = se2.between(chain.xyyaw[:-1], chain.xyyaw[1:])
     cov = _motion_covariance(chain, motions)
     poses = start
-    spread = np.broadcast_to(np.diag(FLOOR**2), (len(start), 3, 3))
+    floor = floor_covariance(field)
+    spread = np.broadcast_to(floor, (len(start), 3, 3))
     for window in WINDOWS:
         tops = match_each(field, thinned, poses, window)
         held = np.flatnonzero(tops.score >= MIN_SCORE)
@@ -65,7 +69,13 @@ def smooth(
         poses, spread = smooth_chain(
             poses, motions, cov, is_open, chain.is_solid[1:], held, anchors, anchor_cov, seen, fixes
         )
-    return poses, spread + np.diag(FLOOR**2)
+    return poses, spread + floor
+
+
+def floor_covariance(field: ScoreField) -> se2.Array:
+    """(3, 3) of what no number of beams can better: how well the map itself is drawn."""
+    coarse_m = COARSE * max(0.0, field.resolution_m - FINE_M)
+    return np.asarray(np.diag(FLOOR**2 + np.array([coarse_m, coarse_m, 0.0]) ** 2))
 
 
 def match_covariance(information: se2.Array, score: se2.Array) -> se2.Array:
