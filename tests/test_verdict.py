@@ -202,6 +202,22 @@ def test_two_places_that_explain_all_are_unobservable():
     assert (judgement.state, ids(judgement)) == ("unobservable", ["SR-LOC-002"])
 
 
+def test_stretch_that_another_place_explains_as_well_is_unobservable():
+    bundle = synthetic_bundle(seconds=30.0)
+    found = hindsight_of(bundle)
+    lead = np.full(len(found.track), 0.4)
+    lead[100:200] = 0.02
+    xyyaw = found.track.xyyaw.copy()
+    xyyaw[100:200] = np.nan
+    found = replace(hindsight_of(bundle, xyyaw=xyyaw), lead=lead)
+
+    judgement = judged(bundle, found)
+
+    assert [i.state for i in judgement.intervals] == ["healthy", "unobservable", "healthy"]
+    assert (judgement.state, ids(judgement)) == ("healthy", ["SR-LOC-002"])
+    assert judgement.intervals[1].confidence is None
+
+
 def test_poor_hindsight_accuses_nobody():
     bundle = synthetic_bundle(belief_offset_xyyaw=(2.0, 0.0, 0.0), offset_from_s=6.0)
     vague = judged(bundle, hindsight_of(bundle, sigma=0.6))

@@ -100,8 +100,10 @@ def _unobservable(
     intervals: Sequence[Interval], hindsight: Hindsight, limits: Limits
 ) -> list[Finding]:
     found = [i for i in intervals if i.state == "unobservable"]
-    if not found or hindsight.margin is None:
+    if not found:
         return []
+    if hindsight.margin is None or hindsight.margin >= limits.margin:
+        return [_lookalike(i, hindsight, limits) for i in found]
     text = (
         f"the best sequence of places beats the best different one by {hindsight.margin:.4f} in "
         f"mean score per scan; less than {limits.margin:g} is within the noise"
@@ -112,6 +114,20 @@ def _unobservable(
             "SR-LOC-002", "warning", text, start, end, value=hindsight.margin, low=limits.margin
         )
     ]
+
+
+def _lookalike(i: Interval, hindsight: Hindsight, limits: Limits) -> Finding:
+    """A stretch of a log that is placed for the rest."""
+    t_ns = hindsight.track.t_ns
+    lead = hindsight.lead[(t_ns >= i.start_ns) & (t_ns < i.end_ns)]
+    least = float(lead.min())
+    text = (
+        f"for {i.duration_ns / NS_PER_S:.1f} s another place explains the scans as well: the best "
+        f"one leads by {least:.3f} in mean score; less than {limits.lead:g} is within the noise"
+    )
+    return Finding(
+        "SR-LOC-002", "warning", text, i.start_ns, i.end_ns, value=least, low=limits.lead
+    )
 
 
 def _wrong_map(fit: MapFit | None, limits: Limits, span: tuple[int, int]) -> list[Finding]:

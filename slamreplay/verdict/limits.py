@@ -20,6 +20,8 @@ class Limits:
         total_s: lost (or changed) for this long in all makes the log a lost (or changed) one.
         margin: hindsight whose best sequence of places beats the best different one by less than
             this mean score per scan cannot tell them apart.
+        lead: an unjudged moment whose place beats the best different one by less than this mean
+            score of its stretch is unobservable rather than short of data.
         fits_from: a log whose typical scan scores less (0 to 1) fits nowhere in the map.
         fits_well_from: one that scores less than this fits only if the best sequence of places
             beats the best different one by `clear_margin`.
@@ -44,6 +46,7 @@ class Limits:
     bridge_s: float = 1.0
     total_s: float = 5.0
     margin: float = 0.01
+    lead: float = 0.085
     fits_from: float = 0.35
     fits_well_from: float = 0.7
     clear_margin: float = 0.1

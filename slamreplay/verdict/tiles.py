@@ -24,12 +24,16 @@ from slamreplay.verdict.timing import Delay
 
 @dataclass(frozen=True, eq=False)
 class Evidence:
-    """What the tiles are made of: belief against hindsight, and the offset taken out of it."""
+    """What the tiles are made of: belief against hindsight, and the offset taken out of it.
+
+    `lead` is hindsight's at the moments of `error`, inf where it has none.
+    """
 
     error: BeliefError
     changes: Changes | None
     offset: ConstantOffset | None
     trusted: float
+    lead: se2.Array
 
 
 def gathered(
@@ -59,7 +63,9 @@ def gathered(
             belief.cov,
         )
         error = belief_error(moved, hindsight, limits, late_ns)
-    return Evidence(error, hindsight.changes, offset, trust(hindsight))
+    order = np.argsort(hindsight.track.t_ns, kind="stable")
+    lead = hindsight.lead[order] if len(hindsight.lead) else np.full(len(order), np.inf)
+    return Evidence(error, hindsight.changes, offset, trust(hindsight), lead)
 
 
 def intervals_of(view: BundleView, evidence: Evidence, limits: Limits) -> tuple[Interval, ...]:
@@ -74,7 +80,19 @@ def intervals_of(view: BundleView, evidence: Evidence, limits: Limits) -> tuple[
     tiles = tiled(
         settled(lost, ns(limits.lost_s), bridge), settled(changed, ns(limits.changed_s), bridge)
     )
-    return tuple(_numbered(tile, evidence, limits) for tile in tiles)
+    return tuple(
+        _numbered(_why_unjudged(tile, evidence, limits), evidence, limits) for tile in tiles
+    )
+
+
+def _why_unjudged(tile: Interval, evidence: Evidence, limits: Limits) -> Interval:
+    """The same tile; unobservable where another place explains most of its scans as well."""
+    if tile.state != "insufficient_data":
+        return tile
+    t_ns = evidence.error.t_ns
+    alike = evidence.lead[(t_ns >= tile.start_ns) & (t_ns < tile.end_ns)] < limits.lead
+    is_most = 2 * np.count_nonzero(alike) > len(alike)
+    return replace(tile, state="unobservable") if is_most else tile
 
 
 def _lost_flags(error: BeliefError, limits: Limits) -> NDArray[np.int8]:
@@ -113,12 +131,13 @@ def _numbered(tile: Interval, evidence: Evidence, limits: Limits) -> Interval:
         "map_changed": ("SR-MAP-001",),
         "lost_and_map_changed": ("SR-LOC-001", "SR-MAP-001"),
         "insufficient_data": ("SR-LOC-004",),
+        "unobservable": ("SR-LOC-002",),
     }.get(tile.state, ())
     offset = evidence.offset
     if offset is not None and (tile.is_lost or offset.cause == "map"):
         ids = (*ids, *(("SR-MAP-FRAME",) if offset.cause != "lookalike" else ()))
     sure = None
-    if tile.state != "insufficient_data":
+    if tile.state not in ("insufficient_data", "unobservable"):
         p = p_off(error, limits)[inside]
         # Before the first belief either may be true: then the map alone is judged.
         unspoken = 1.0 - float(np.isfinite(p).mean()) if len(p) else 0.0
