@@ -5,6 +5,7 @@ import pytest
 
 from slamreplay.bench import inject, real
 from slamreplay.bundle.scans import scan_set
+from slamreplay.consistency.sensed import sensed_references
 from slamreplay.geometry import se2, se3
 from slamreplay.geometry.times import NS_PER_S, ns
 from slamreplay.hindsight.pipeline import hindsight
@@ -30,6 +31,19 @@ def error_after_alignment(track, t_ns, poses):
     return np.hypot(*(se2.transform_points(np.array([0.0, 0.0, turn]), a) - b).T)
 
 
+def heading_lag_s(track, t_ns, poses):
+    """By how much stamps (M,) of poses must grow for the headings to turn when the track does.
+
+    Difference of the headings regressed on the turn rate, beside a constant and a drift.
+    """
+    inside = (track.t_ns >= t_ns[0]) & (track.t_ns <= t_ns[-1]) & track.has_pose
+    at_s = (track.t_ns[inside] - t_ns[0]) / NS_PER_S
+    ours = np.unwrap(track.xyyaw[inside, 2])
+    theirs = np.unwrap(se2.interpolate(t_ns, poses, track.t_ns[inside])[:, 2])
+    rows = np.column_stack([np.gradient(ours, at_s), np.ones(len(at_s)), at_s])
+    return -np.linalg.lstsq(rows, ours - theirs, rcond=None)[0][0]
+
+
 def test_hindsight_agrees_with_the_reflectors(real_logs, tmp_path):
     folder = real_logs / "inesctec_jarvis"
     options = IngestOptions(map=folder / "maps/i-108_10mm.yaml")
@@ -41,6 +55,12 @@ def test_hindsight_agrees_with_the_reflectors(real_logs, tmp_path):
     error = error_after_alignment(found.track, t_ns, poses)
     assert np.median(error) < 0.03
     assert np.percentile(error, 95) < 0.05
+    # The two do not share a clock; turns alone tell by how much, no place or transform enters.
+    lag_s = heading_lag_s(found.track, t_ns, poses)
+    assert 0.1 < lag_s < 0.16
+    error = error_after_alignment(found.track, t_ns + ns(lag_s), poses)
+    assert np.median(error) < 0.012
+    assert np.percentile(error, 95) < 0.03
 
 
 def test_hindsight_agrees_with_tags_on_the_ceiling(real_logs, tmp_path):
@@ -51,6 +71,14 @@ def test_hindsight_agrees_with_tags_on_the_ceiling(real_logs, tmp_path):
 
     assert np.median(error_after_alignment(found.track, t_ns, tags)) < 0.12
     seen = bundle.view().table("references")
+    apart = {
+        kind: next(f for f in sensed_references(bundle, h, ["fiducial"]) if f.id == "SR-REF-002")
+        for kind, h in (("used", found), ("out", hindsight(bundle.view(["fiducial"]))))
+    }
+    assert found.joined["fiducial"] > 50
+    assert apart["out"].value < 0.05  # the camera is not on tf: its place was found as well
+    assert apart["used"].value <= apart["out"].value + 0.002
+    assert apart["used"].high < apart["out"].high
     assert set(seen["child_frame_id"][seen["kind"] == "fiducial"]) == {
         f"tag_{i}" for i in (0, 1, 3, 4, 6, 7)
     }
