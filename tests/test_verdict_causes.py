@@ -360,6 +360,27 @@ def test_an_error_that_grows_is_drift_or_a_false_trust_in_itself(sigma_m, kind):
     assert (judgement.state, judgement.failure_mode.kind) == ("lost", kind)
 
 
+@pytest.mark.parametrize(("off_m", "told"), [(0.1, True), (2.0, False)])
+def test_a_cloud_that_was_right_is_said_where_the_belief_was_wrong(off_m, told):
+    bundle = synthetic_bundle(belief_offset_xyyaw=(2.0, 0.0, 0.0), offset_from_s=0.0)
+    t_s = np.arange(0.5, 18.0, 0.5)
+    around = np.random.default_rng(0).normal(0.0, 0.05, (len(t_s), 50, 3))
+    clouds = true_path(t_s)[:, None, :] + around + np.array([off_m, 0.0, 0.0])
+    table = rows(
+        "particles",
+        t_s,
+        frame_id=["map"] * len(t_s),
+        xyyaw=[cloud.ravel() for cloud in clouds],
+        weights=[np.zeros(0)] * len(t_s),
+    )
+    view = bundle.view().with_table(table)
+    judgement = judge(view, recorded_belief(view, at_scans(bundle)), hindsight_of(bundle))
+
+    assert judgement.state == "lost"
+    assert ("its particles were right" in " ".join(judgement.failure_mode.evidence)) == told
+    assert (judgement.failure_mode.kind == "none") == told
+
+
 def test_summaries_are_short_and_do_not_contradict_themselves():
     bundle = synthetic_bundle(belief_offset_xyyaw=(1.0, 0.5, 0.0), offset_from_s=8.0)
     both = judged(bundle, hindsight_of(bundle, shares=shares_between(bundle, 5, 15, 0.3)))

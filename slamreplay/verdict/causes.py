@@ -9,6 +9,7 @@ import numpy as np
 
 from slamreplay.geometry.times import NS_PER_S
 from slamreplay.verdict.case import Case
+from slamreplay.verdict.cloud import right_cloud_m
 from slamreplay.verdict.fit_at import fits_at_belief
 from slamreplay.verdict.judgement import FailureKind, Interval
 from slamreplay.verdict.partings import DISAGREE_M, Parting, parting
@@ -37,6 +38,19 @@ BLIND_NS = 3 * NS_PER_S
 CHANGED_BEFORE_NS = 10 * NS_PER_S
 
 Answer = tuple[FailureKind, float | None, list[str]]
+
+
+def told_otherwise(case: Case, lost: Interval) -> Answer | None:
+    """The localizer thought right and sent something else to tf: none of the causes below."""
+    error = case.error
+    metres = right_cloud_m(case.view, error, case.limits, lost.start_ns, lost.end_ns)
+    if metres is None:
+        return None
+    text = (
+        f"its particles were right (typically {metres:.2f} m off) while the pose it gave to the "
+        f"robot was up to {lost.max_error_m or 0.0:.2f} m off: look at how it fills map to odom"
+    )
+    return "none", None, [text]
 
 
 def from_the_start(case: Case, lost: Interval, onset: int) -> Answer | None:

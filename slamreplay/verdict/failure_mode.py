@@ -31,6 +31,7 @@ def failure_mode(case: Case) -> FailureMode:
     onset = case.since_lost(worst)
     bold = bold_words(case.error, worst, case.sigma_belief_m, case.start_ns)
     questions: tuple[Callable[[], causes.Answer | None], ...] = (
+        lambda: causes.told_otherwise(case, worst),
         lambda: causes.from_the_start(case, worst, onset),
         lambda: causes.moved_otherwise(case, onset),
         lambda: causes.was_set(case, onset),
