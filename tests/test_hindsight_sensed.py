@@ -18,7 +18,8 @@ from slamreplay.geometry.geodesy import earth_from_geodetic, enu_axes
 from slamreplay.hindsight.chain import Chain
 from slamreplay.hindsight.pipeline import hindsight
 from slamreplay.hindsight.places import Hypotheses
-from slamreplay.hindsight.sensed import Sensed, sensed
+from slamreplay.hindsight.sensed import Sensed
+from slamreplay.hindsight.sensing import sensed
 from slamreplay.hindsight.submaps import Submap
 from slamreplay.hindsight.witnessed import witnessed_places
 from slamreplay.maps.grid import OccupancyGrid

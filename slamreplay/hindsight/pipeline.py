@@ -31,7 +31,7 @@ from slamreplay.hindsight.places import (
 from slamreplay.hindsight.reseating import reseated
 from slamreplay.hindsight.search import hypotheses_of
 from slamreplay.hindsight.seating import seat_keyframes
-from slamreplay.hindsight.sensed import sensed
+from slamreplay.hindsight.sensing import sensed
 from slamreplay.hindsight.smoothing import smooth
 from slamreplay.hindsight.submaps import Submap, submaps
 from slamreplay.hindsight.trust import keyframe_leads, trusted_keyframes
