@@ -28,7 +28,7 @@ MIN_SCORE = 0.3
 #: robots included. Above that: short-ranged lasers among moved racks.
 SAME_EVIDENCE = 3.0
 #: Mean score from which on a match is taken at its word.
-DOUBT_BELOW = 0.75
+DOUBT_BELOW = 0.85
 #: What a map and a scanner leave in any match: metres, metres, radians.
 FLOOR = np.array([0.008, 0.008, 0.0015])
 #: A wall lies anywhere in its cells, and all beams on it are off by the same. Cells up to FINE_M
