@@ -22,6 +22,7 @@ from slamreplay.hindsight.carry import carry, scan_scores, settle
 from slamreplay.hindsight.chain import Chain, scan_matched, torn_links
 from slamreplay.hindsight.changes import find_changes
 from slamreplay.hindsight.deskew import longest_sweep_s, motion_as_matched
+from slamreplay.hindsight.heirs import with_heirs
 from slamreplay.hindsight.keyframes import keyframes, with_more
 from slamreplay.hindsight.places import (
     JUMP_BROKEN,
@@ -122,6 +123,7 @@ def _rebuilt(
         jump_costs == JUMP_SOLID,
         lambda share: say("places on the map", 0.3 + 0.4 * share),
     )
+    hypotheses = with_heirs(space, working, found, hypotheses, motions, jump_costs)
     other = sensed(view, motion, beams.t_ns[keys], chain.xyyaw, se2.inverse(working.origin_xyyaw))
     places = witnessed_places(hypotheses, motions, jump_costs, chain, found, other)
     start, is_open = seat_keyframes(field, points, chain, found, places)

@@ -22,10 +22,23 @@ APART_M, APART_RAD = 0.5, 0.35
 
 @dataclass(frozen=True, eq=False)
 class Hypotheses:
-    """Candidate poses of one submap's reference keyframe and their scores in 0 to 1."""
+    """Candidate poses of one submap's reference keyframe and their scores in 0 to 1.
+
+    Attributes:
+        xyyaw: (H, 3) poses.
+        score: (H,) how well each fits.
+        chance: what this submap scores somewhere on this map by chance; a place that fits worse
+            is no less likely for it. -inf where the whole map was not searched.
+    """
 
     xyyaw: se2.Array
     score: se2.Array
+    chance: float = float("-inf")
+
+    @property
+    def log_likelihood(self) -> se2.Array:
+        """(H,) up to a constant."""
+        return np.asarray(WEIGHT * np.maximum(self.score, self.chance))
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,7 +112,7 @@ def _likelihoods(
     hypotheses: Sequence[Hypotheses], motions: se2.Array, jump_cost: se2.Array
 ) -> tuple[list[se2.Array], list[se2.Array]]:
     """Log-likelihoods of each submap's hypotheses and of each pair of neighbours'."""
-    unary = [WEIGHT * h.score for h in hypotheses]
+    unary = [h.log_likelihood for h in hypotheses]
     pairs = []
     for s, motion in enumerate(motions):
         expected = se2.compose(hypotheses[s].xyyaw, motion)

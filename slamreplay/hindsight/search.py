@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,9 @@ from slamreplay.matching.field import WorkingMap
 from slamreplay.matching.whole_map import SearchSpace, distinct, search_map
 
 COUNT, PASSED_ON = 40, 6
+#: So many other places of a whole map fit as well by chance: where scans see people, or what the
+#: map does not have, the best place on the map is only the luckiest.
+CHANCE_RANK = 10
 #: Where the motion is beyond doubt, every so manieth submap is searched for on the whole map; those
 #: between take over the places of both, carried by that motion: this many.
 SEARCH_STRIDE, CARRIED_ON = 4, 16
@@ -52,18 +56,21 @@ def hypotheses_of(
         poses, scores = np.empty((0, 3)), np.empty(0)
         if searched[i]:
             poses, scores = search_map(space, submap.points, count=COUNT)
-        lists.append(_scored(working, submap, poses, scores))
+        known = _scored(working, submap, poses, scores)
+        if len(known.score) > CHANCE_RANK:
+            known = replace(known, chance=float(known.score[CHANCE_RANK]))
+        lists.append(known)
         say((i + 1) / len(found))
     for s in np.flatnonzero(~is_break).tolist():
         many = PASSED_ON if searched[s + 1] else CARRIED_ON
         onward = se2.compose(lists[s].xyyaw[:many], motions[s])
         is_sure = bool(is_solid[s] and not searched[s + 1])
-        lists[s + 1] = _joined(space, working, found[s + 1], lists[s + 1], onward, is_sure=is_sure)
+        lists[s + 1] = joined(space, working, found[s + 1], lists[s + 1], onward, is_sure=is_sure)
     for s in np.flatnonzero(~is_break)[::-1].tolist():
         many = PASSED_ON if searched[s] else CARRIED_ON
         back = se2.compose(lists[s + 1].xyyaw[:many], se2.inverse(motions[s]))
         is_sure = bool(is_solid[s] and not searched[s])
-        lists[s] = _joined(space, working, found[s], lists[s], back, is_sure=is_sure)
+        lists[s] = joined(space, working, found[s], lists[s], back, is_sure=is_sure)
     return lists
 
 
@@ -84,7 +91,7 @@ def _scored(working: WorkingMap, submap: Submap, poses: se2.Array, scores: se2.A
     return Hypotheses(poses[order], scores[order])
 
 
-def _joined(
+def joined(
     space: SearchSpace,
     working: WorkingMap,
     submap: Submap,
@@ -93,7 +100,7 @@ def _joined(
     *,
     is_sure: bool,
 ) -> Hypotheses:
-    """The known places and those that a neighbour's lead to; sure motion needs no window."""
+    """The known places and those (N, 3) that a neighbour's lead to; sure motion needs no window."""
     # As expected and unmoved too: where nothing of the map is left, a window leads astray.
     found = match_each(space.fine, [submap.points], new if is_sure else new[:1], None)
     poses, scores = found.xyyaw, found.score
@@ -104,4 +111,4 @@ def _joined(
     poses = np.concatenate([known.xyyaw, fresh.xyyaw])
     scores = np.concatenate([known.score, fresh.score])
     keep = distinct(poses, scores, len(poses), apart_m=0.1, apart_rad=0.05)
-    return Hypotheses(poses[keep], scores[keep])
+    return Hypotheses(poses[keep], scores[keep], known.chance)

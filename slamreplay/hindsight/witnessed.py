@@ -120,7 +120,7 @@ def _told(
 ) -> list[Hypotheses]:
     """The hypotheses with scores that count what things at these places say."""
     return [
-        Hypotheses(h.xyyaw, h.score - _cost(h.xyyaw, view, at) / WEIGHT)
+        Hypotheses(h.xyyaw, (h.log_likelihood - _cost(h.xyyaw, view, at)) / WEIGHT)
         for h, view in zip(hypotheses, views, strict=True)
     ]
 
@@ -140,7 +140,7 @@ def _candidates(hypotheses: Sequence[Hypotheses], views: Views, j: int) -> list[
     worth = np.zeros(len(places))
     for s, others in zip(seeing, seen, strict=True):
         apart = _miss(others[None, :, :].repeat(len(places), axis=0), places[:, None, :])
-        worth += (WEIGHT * hypotheses[s].score[None, :] - apart).max(axis=1)
+        worth += (hypotheses[s].log_likelihood[None, :] - apart).max(axis=1)
     kept: list[se2.Array] = []
     for place in places[np.argsort(-worth, kind="stable")]:
         if all(_miss(place, other) > _AGREES for other in kept):
