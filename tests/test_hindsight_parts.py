@@ -11,7 +11,7 @@ from slamreplay.hindsight.beams import HIT, INVALID, MISS, Beams, interleaved, s
 from slamreplay.hindsight.chain import Chain
 from slamreplay.hindsight.changes import find_changes
 from slamreplay.hindsight.keyframes import keyframes, with_more
-from slamreplay.hindsight.pipeline import motion_by_scans
+from slamreplay.hindsight.laid import motion_by_scans
 from slamreplay.hindsight.places import (
     JUMP_DOUBTFUL,
     JUMP_SOLID,

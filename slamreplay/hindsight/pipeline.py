@@ -17,13 +17,12 @@ from slamreplay.bundle.track import PoseTrack
 from slamreplay.bundle.view import BundleView
 from slamreplay.geometry import se2
 from slamreplay.geometry.covariance import turned
-from slamreplay.hindsight.beams import Beams, beams_of, interleaved, side_by_side
+from slamreplay.hindsight.beams import Beams, interleaved
 from slamreplay.hindsight.carry import carry, scan_scores, settle
-from slamreplay.hindsight.chain import Chain, scan_matched, torn_links
+from slamreplay.hindsight.chain import Chain
 from slamreplay.hindsight.changes import find_changes
-from slamreplay.hindsight.deskew import longest_sweep_s, motion_as_matched
 from slamreplay.hindsight.heirs import with_heirs
-from slamreplay.hindsight.keyframes import keyframes, with_more
+from slamreplay.hindsight.laid import laid_out
 from slamreplay.hindsight.places import (
     JUMP_BROKEN,
     JUMP_DOUBTFUL,
@@ -42,8 +41,6 @@ from slamreplay.matching.field import ScoreField, WorkingMap, working_map
 from slamreplay.matching.whole_map import search_space
 
 SIGMA_M = 0.12
-#: Without odometry nothing tells how a robot moved while it saw nothing for longer than this.
-UNSEEN_NS = 1_000_000_000
 #: A second laser that the map explains this much worse than the first is left out.
 MISFIT = 0.8
 #: Where two lasers together place less of the scans than this, the first one is asked alone.
@@ -86,27 +83,11 @@ def _rebuilt(
 ) -> Hindsight | None:
     """Hindsight from these lasers; None where the map explains the second far worse."""
     say("keyframes", 0.0)
-    motion, is_unknown = lasers[0].odometry, np.zeros(len(lasers[0].t_ns), dtype=bool)
-    if motion is None or not motion.has_pose.any():
-        still = _beside([beams_of(laser, None) for laser in lasers], None)
-        motion, is_unknown = motion_by_scans(base, still)
-    each = [beams_of(laser, motion) for laser in lasers]
-    beams = _beside(each, motion)
-    odometry = odometry_at(motion, beams.t_ns)
-    keys = keyframes(beams, odometry, is_unknown)
+    laid = laid_out(base, lasers, lambda: say("scan matching", 0.05))
+    motion, each, beams, odometry = laid.motion, laid.each, laid.beams, laid.odometry
+    keys, points, chain = laid.keys, laid.points, laid.chain
     if not len(keys):
         return _nowhere(grid.frame_id, base, beams)
-    say("scan matching", 0.05)
-    points, chain = _chained(beams, odometry, keys, is_unknown)
-    is_torn = torn_links(chain, odometry[keys])
-    if (more := with_more(beams, keys, is_torn)).size > keys.size:
-        keys = more
-        points, chain = _chained(beams, odometry, keys, is_unknown)
-    matched = motion_as_matched(base, beams.t_ns, odometry, keys, chain, longest_sweep_s(lasers))
-    if matched is not None:
-        motion, each = matched, [beams_of(laser, matched) for laser in lasers]
-        beams = _beside(each, motion)
-        points, chain = _chained(beams, odometry, keys, is_unknown)
     found = submaps(chain, points, beams.laser_xy)
     if not found:
         return _nowhere(grid.frame_id, base, beams)
@@ -163,16 +144,6 @@ def _rebuilt(
     )
 
 
-def _chained(
-    beams: Beams, odometry: se2.Array, keys: NDArray[np.int64], is_unknown: NDArray[np.bool_]
-) -> tuple[list[se2.Array], Chain]:
-    """Points of the keyframes, and how their scans lie to each other."""
-    points = [beams.points(k) for k in keys]
-    parts = np.cumsum(is_unknown)[keys]
-    over_unknown = np.append(False, parts[1:] > parts[:-1])
-    return points, scan_matched(points, odometry[keys], beams.t_ns[keys], over_unknown)
-
-
 def _second_misfits(
     field: ScoreField, each: list[Beams], poses: se2.Array, motion: PoseTrack
 ) -> bool:
@@ -187,38 +158,6 @@ def _second_misfits(
     if not (np.isfinite(ours).any() and np.isfinite(theirs).any()):
         return False
     return bool(np.nanmedian(theirs) < MISFIT * np.nanmedian(ours))
-
-
-def odometry_at(motion: PoseTrack, t_ns: NDArray[np.int64]) -> se2.Array:
-    """(N, 3) odometry at times (N,).
-
-    Before the first sample, after the last and in gaps the robot is taken to stand; the keyframes'
-    own scan matching finds out where it did not.
-    """
-    poses = motion.at(t_ns, max_gap_ns=10_000_000_000).xyyaw.copy()
-    known = np.flatnonzero(np.isfinite(poses).all(axis=1))
-    if not len(known):
-        return np.zeros((len(t_ns), 3))
-    before = np.searchsorted(known, np.arange(len(poses)), side="right") - 1
-    return np.asarray(poses[known[np.maximum(before, 0)]])
-
-
-def motion_by_scans(base: str, beams: Beams) -> tuple[PoseTrack, NDArray[np.bool_]]:
-    """What stands in for odometry where a log has none: each scan matched to those before it.
-
-    Returns:
-        The track, and for each scan (N,) whether the motion to it is not known: too long after the
-        one before, or like nothing before it.
-    """
-    late = np.append(False, np.diff(beams.t_ns) > UNSEEN_NS)
-    points = [beams.points(k) for k in range(len(beams))]
-    chain = scan_matched(points, None, beams.t_ns, late)
-    track = PoseTrack.without_covariance("odom", base, beams.t_ns, chain.xyyaw)
-    return track, chain.is_break
-
-
-def _beside(each: list[Beams], motion: PoseTrack | None) -> Beams:
-    return each[0] if len(each) == 1 else side_by_side(each[0], each[1], motion)
 
 
 def _changes(
