@@ -149,6 +149,19 @@ def test_person_who_stands_a_while_and_walks_on_is_no_change(stands_s):
     assert found.changed_share.max() == 0.0
 
 
+def test_people_who_pass_one_spot_again_and_again_are_no_change():
+    """Too often for the spot to be seen empty for as long as somebody is seen on it."""
+    phases = [
+        (2.0 * k + 0.2 * i, 2.0 * k + 0.2 * (i + 1), put(hall().cells, (x, 1.5), (x + 0.5, 2.0)))
+        for k in range(20)
+        for i, x in enumerate(np.linspace(2.0, 4.0, 10))
+    ]
+    found = find(phases)
+
+    assert found.regions == ()
+    assert found.changed_share.max() == 0.0
+
+
 def test_load_that_creeps_along_is_no_change():
     phases = [
         (k * 0.5, (k + 1) * 0.5, put(hall().cells, (1.5 + 0.1 * k, 2.0), (2.5 + 0.1 * k, 2.8)))

@@ -28,6 +28,9 @@ LOAD_S = 20.0
 #: Where more than this share of what was seen contradicts that it came and went as a whole, it has
 #: moved along, unless it stayed for so long that this is noise of the poses.
 CREPT_SHARE, CREPT_S = 0.35, 15.0
+#: What stands is met at nearly every look at it: thin legs at this share of them or more. Where
+#: people pass again and again, or follow each other, beams reach through in between.
+STEADY_SHARE = 0.75
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,7 +102,9 @@ def standing(
     until = _nearest(empty & (bins < first[:, None]), earlier=True)
     again = _nearest(empty & (bins > last[:, None]), earlier=False)
     course = BIN_S * np.column_stack([until, first, last, again])
-    holds = inside & _things(where, slots, seen_s, course)[:, None]
+    looked = np.count_nonzero((seen | through) & inside, axis=1)
+    steady = np.count_nonzero(seen & inside, axis=1) / np.maximum(looked, 1)
+    holds = inside & _things(where, slots, seen_s, course, steady)[:, None]
     return Standing(
         slots, holds, seen, empty, seen_s, np.count_nonzero(empty & inside, axis=1) * BIN_S
     )
@@ -148,6 +153,7 @@ def _things(
     slots: NDArray[np.int32],
     seen_s: NDArray[np.float64],
     course_s: NDArray[np.float64],
+    steady: NDArray[np.float64],
 ) -> NDArray[np.bool_]:
     """(C,) which cells belong to something that stands: connected ones are one thing.
 
@@ -156,6 +162,7 @@ def _things(
         slots: (H, W) numbers of the cells.
         seen_s: (C,) for how long each was seen.
         course_s: (C, 4) when it was last empty before, first and last seen, and next empty.
+        steady: (C,) share of the looks at each, while it was taken, that met something there.
     """
     part = np.zeros(where.shape, dtype=bool)
     cells = np.argwhere(slots >= 0)  # in the order of the slots
@@ -168,6 +175,8 @@ def _things(
     bounds = np.searchsorted(thing[order], np.arange(1, count + 2))
     for k in range(count):
         of_it = order[bounds[k] : bounds[k + 1]]
+        if np.average(steady[of_it], weights=seen_s[of_it]) < STEADY_SHARE:
+            continue
         longest_s = float(seen_s[of_it].max())
         core = of_it[seen_s[of_it] >= min(STANDING_S, longest_s)]
         size_m = float(np.ptp(cells[core], axis=0).max() + 1) * where.cell_m
