@@ -117,6 +117,16 @@ def test_rack_taken_down_elsewhere_is_gone_from_then_on():
     assert found.removed_share[80:].min() > 0.05
 
 
+def test_rack_that_is_gone_goes_with_its_inside_and_its_back():
+    found = find([(0, 10, without_rack())])
+    rack = np.zeros((200, 200), dtype=bool)
+    rack[140:150, 60:120] = True
+
+    assert (found.removed[rack & hall().occupied]).mean() > 0.99
+    assert found.opened[rack & (hall().cells < 0)].mean() > 0.99
+    assert not (found.removed | found.opened)[~rack].any()
+
+
 def test_rack_gone_beside_the_robot_is_told_by_a_lidar_that_sees_as_far_elsewhere():
     found = find([(0, 10, without_rack())], lost=lambda ranges: ranges > 5.9)
 

@@ -4,21 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import (
-    binary_dilation,
-    binary_propagation,
-    distance_transform_edt,
-    maximum_filter,
-    minimum_filter,
-)
+from scipy.ndimage import binary_propagation, distance_transform_edt, maximum_filter
 
 from slamreplay.bundle.products import Changes
 from slamreplay.geometry import se2
 from slamreplay.hindsight.beams import HIT, INVALID, MISS, Beams
 from slamreplay.hindsight.changed_beams import BEYOND, BEYOND_M, NEARER, SILENT, BeamsOnMap, on_map
-from slamreplay.hindsight.evidence import BIN_S, Lattice, lattice, passes
+from slamreplay.hindsight.evidence import BIN_S, Lattice, Passes, lattice, passes
 from slamreplay.hindsight.freshness import freshness_of
-from slamreplay.hindsight.gone import GONE_S, Gone, gone
+from slamreplay.hindsight.gone import GONE_S, gone
 from slamreplay.hindsight.reach import is_lossy, proven_reach_m
 from slamreplay.hindsight.regions import Contradictions, changed_regions
 from slamreplay.hindsight.standing import asked_cells, standing
@@ -61,9 +55,9 @@ def find_changes(
     removed_share = np.count_nonzero(is_gone, axis=1) / valid
     appeared = _mask(working, laid.where[is_new])
     removed = _mask(working, laid.where[is_gone])
-    removed |= _went_with_it(
-        working, where, removed, passed.bin_count, _still_seen(where, beams, ends, away)
-    )
+    empty = where.fine(_empty_since(where, beams, ends, passed), working.walls.shape)
+    with_it = _went_with_it(working, removed, empty)
+    removed |= with_it & working.walls
     new_clear = _clear(working, where, new.slots, new.seen_s, new.through_s)
     gone_clear = _clear(working, where, away.slots, away.through_s, away.seen_s)
     regions = changed_regions(
@@ -79,7 +73,7 @@ def find_changes(
         appeared_share + removed_share,
         appeared_share,
         removed_share,
-        _to_grid(grid, working, _opened(working, where, removed, passed.bin_count)),
+        _to_grid(grid, working, with_it & working.unknown),
         freshness_of(working, where, laid, beams.t_ns, passed, new, away, removed),
     )
 
@@ -130,49 +124,37 @@ def _mask(working: WorkingMap, index: NDArray[np.int32]) -> NDArray[np.bool_]:
     return mask.reshape(working.walls.shape)
 
 
-def _still_seen(
-    where: Lattice, beams: Beams, ends: NDArray[np.int64], away: Gone
+def _empty_since(
+    where: Lattice, beams: Beams, ends: NDArray[np.int64], passed: Passes
 ) -> NDArray[np.bool_]:
-    """(H, W) evidence cells near which something is seen after the walls about them were gone."""
-    last = np.full(where.shape, -1, dtype=np.int32)
+    """(H, W) evidence cells that beams went through, and near which nothing was seen after that."""
+    seen = np.full(where.shape, -where.bin_count, dtype=np.int32)
     at = ends >= 0
     bins = np.broadcast_to(where.bins[:, None], beams.kind.shape)[beams.kind == HIT][at]
-    np.maximum.at(last.ravel(), ends[at], bins)
-    since = np.full(where.shape, where.bin_count, dtype=np.int32)
-    slots = away.slots >= 0
-    first = np.where(away.holds.any(axis=1), away.holds.argmax(axis=1), where.bin_count)
-    since[slots] = first[away.slots[slots]]
-    reach = 2 * round(BEYOND_M / where.cell_m) + 1
-    return maximum_filter(last, reach) > minimum_filter(since, reach)
+    np.maximum.at(seen.ravel(), ends[at], bins)
+    near = maximum_filter(seen, 2 * round(BEYOND_M / where.cell_m) + 1)
+    went = np.where(passed.last >= 0, where.bins[np.maximum(passed.last, 0)], -1)
+    long_enough = round(GONE_S / BIN_S)
+    return np.asarray((passed.bin_count >= long_enough) & (went >= near + long_enough))
 
 
 def _went_with_it(
-    working: WorkingMap,
-    where: Lattice,
-    removed: NDArray[np.bool_],
-    pass_bins: NDArray[np.uint16],
-    still_seen: NDArray[np.bool_],
+    working: WorkingMap, removed: NDArray[np.bool_], empty: NDArray[np.bool_]
 ) -> NDArray[np.bool_]:
-    """(H, W) walls that went with the first cells that beams met: those behind them, passed too."""
-    reach = 2 * round(BEYOND_M / working.resolution_m) + 1
-    beside = maximum_filter(removed, reach)
-    empty = (pass_bins * BIN_S >= GONE_S) & ~still_seen
-    return beside & working.walls & where.fine(empty, working.walls.shape)
+    """(H, W) walls and unmapped cells seen empty that hang together with walls that are gone.
 
+    Beams say of the first wall alone that it is gone. A rack has an inside that nobody mapped, and
+    a back.
 
-def _opened(
-    working: WorkingMap,
-    where: Lattice,
-    removed: NDArray[np.bool_],
-    pass_bins: NDArray[np.uint16],
-) -> NDArray[np.bool_]:
-    """(H, W) unmapped cells seen empty that join on to walls that are gone."""
-    passed = where.fine(pass_bins * BIN_S >= GONE_S, working.walls.shape)
-    if not removed.any():
-        return removed
-    near = binary_dilation(removed, np.ones((3, 3), dtype=bool))
-    room = passed & working.unknown
-    return np.asarray(binary_propagation(near & room, mask=room) & room)
+    Args:
+        working: the map.
+        removed: (H, W) the walls that beams met first.
+        empty: (H, W) cells seen empty.
+    """
+    room = empty & (working.walls | working.unknown)
+    near = maximum_filter(removed, 2 * round(BEYOND_M / working.resolution_m) + 1)
+    start = removed | (near & room)
+    return np.asarray(binary_propagation(start, np.ones((3, 3), dtype=bool), mask=start | room))
 
 
 def _clear(
