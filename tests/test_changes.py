@@ -339,7 +339,7 @@ def test_threads_change_nothing(monkeypatch):
     found = []
 
     for threads in (1, 2, 3):
-        monkeypatch.setattr(numba.config, "NUMBA_NUM_THREADS", threads)
+        monkeypatch.setattr(numba, "get_num_threads", lambda threads=threads: threads)
         laid = on_map(working, beams, poses)
         where = lattice(working, beams.t_ns)
         slots = np.arange(where.shape[0] * where.shape[1], dtype=np.int32).reshape(where.shape)

@@ -173,7 +173,7 @@ def test_matching_many_equals_matching_each_on_any_number_of_threads(monkeypatch
     found = []
 
     for threads in (1, 2, 3):
-        monkeypatch.setattr(numba.config, "NUMBA_NUM_THREADS", threads)
+        monkeypatch.setattr(numba, "get_num_threads", lambda threads=threads: threads)
         found.append(match_each(field, clouds, centres, windows))
 
     for one in found[1:]:
@@ -230,7 +230,7 @@ def test_matching_no_points_stays_where_it_is():
 
 @pytest.mark.parametrize("threads", [1, 2, 3])
 def test_lattice_scores_equal_their_plain_sum(monkeypatch, threads):
-    monkeypatch.setattr(numba.config, "NUMBA_NUM_THREADS", threads)
+    monkeypatch.setattr(numba, "get_num_threads", lambda threads=threads: threads)
     coarse = RNG.integers(0, 251, (9, 11)).astype(np.uint8)
     cells = RNG.uniform(-3.0, 3.0, (10, 2))
     headings = np.arange(16) * (np.pi / 8.0)

@@ -10,6 +10,7 @@ from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
+import numba
 import numpy as np
 
 from slamreplay.bench.conditions import CONDITIONS
@@ -116,7 +117,10 @@ def _judged(cases: Sequence[Case], jobs: int) -> Any:
     if jobs <= 1:
         yield from (measured_or_failed(c) for c in cases)
         return
-    with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
+    # A process has one core to itself: threads within it would only stand in each other's way.
+    with ProcessPoolExecutor(
+        jobs, get_context("spawn"), initializer=numba.set_num_threads, initargs=(1,)
+    ) as pool:
         for future in as_completed([pool.submit(measured_or_failed, c) for c in cases]):
             yield future.result()
 

@@ -13,14 +13,14 @@ def share_out(count: int, work: Callable[[int, int], None], least: int = 1) -> N
     """Call `work(first, stop)` for parts that cover 0 to `count`, at once on all cores allowed.
 
     The work on one index must not depend on which others go with it: then what comes out is the
-    same, byte for byte, whatever the number of threads (numba's, so NUMBA_NUM_THREADS sets it).
+    same, byte for byte, whatever the number of threads (numba's: NUMBA_NUM_THREADS sets it).
 
     Args:
         count: of the jobs.
         work: writes its results where nobody else does.
         least: jobs that are worth a thread.
     """
-    parts = max(1, min(numba.config.NUMBA_NUM_THREADS, count // max(least, 1)))
+    parts = max(1, min(numba.get_num_threads(), count // max(least, 1)))
     edges = [count * k // parts for k in range(parts + 1)]
     if parts == 1:
         work(0, count)
