@@ -20,6 +20,7 @@ from slamreplay.hindsight.places import (
     Places,
     best_places,
 )
+from slamreplay.hindsight.pooling import pooled
 from slamreplay.hindsight.smoothing import floor_covariance
 from slamreplay.hindsight.submaps import Submap
 from slamreplay.hindsight.trust import keyframe_leads, trusted_keyframes
@@ -248,6 +249,19 @@ def test_second_laser_lies_beside_the_first_at_its_time():
     np.testing.assert_allclose(both.ends[0, 2:], [[-1.9, 0.0], [-1.9, 1.0]], atol=1e-6)
     assert (both.kind[0] == HIT).all()
     assert (both.kind[1, 2:] == INVALID).all()  # its nearest scan is 0.4 s away
+
+
+def test_shares_are_pooled_by_beams_not_by_scans():
+    kind = np.full((5, 4), HIT, dtype=np.uint8)
+    kind[0, 1:] = INVALID  # one beam
+    both = Beams(np.arange(5), np.zeros((5, 4, 2), np.float32), kind, np.zeros(2))
+    is_first = np.array([False, True, True, False, False])
+
+    share = pooled(both, is_first, np.array([1.0, 0.0, 0.5, np.nan, 0.25]))
+
+    assert share == pytest.approx([1.0 / 5.0, (2.0 + 1.0) / 8.0])
+    alone = pooled(both, np.ones(5, bool), np.array([0.1, 0.2, np.nan, 0.4, 0.5]))
+    assert alone == pytest.approx([0.1, 0.2, np.nan, 0.4, 0.5], nan_ok=True)
 
 
 def test_interleaved_rays_start_at_their_own_laser():

@@ -28,6 +28,7 @@ from slamreplay.hindsight.places import (
     JUMP_DOUBTFUL,
     JUMP_SOLID,
 )
+from slamreplay.hindsight.pooling import pooled
 from slamreplay.hindsight.reseating import reseated
 from slamreplay.hindsight.search import hypotheses_of
 from slamreplay.hindsight.seating import seat_keyframes
@@ -167,7 +168,7 @@ def _changes(
     poses: se2.Array,
     motion: PoseTrack,
 ) -> Changes:
-    """Changes seen by all lasers; the shares are those of the first one's scans."""
+    """Changes seen by all lasers; the shares are pooled at the first one's scans."""
     if len(each) == 1:
         return find_changes(grid, working, each[0], poses)
     both, both_poses, is_first = interleaved(each[0], each[1], poses, motion)
@@ -175,9 +176,9 @@ def _changes(
     return replace(
         found,
         t_ns=found.t_ns[is_first],
-        changed_share=found.changed_share[is_first],
-        appeared_share=found.appeared_share[is_first],
-        removed_share=found.removed_share[is_first],
+        changed_share=pooled(both, is_first, found.changed_share),
+        appeared_share=pooled(both, is_first, found.appeared_share),
+        removed_share=pooled(both, is_first, found.removed_share),
     )
 
 
