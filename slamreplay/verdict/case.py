@@ -13,13 +13,18 @@ from slamreplay.bundle.view import BundleView
 from slamreplay.geometry import se2
 from slamreplay.geometry.times import NS_PER_S
 from slamreplay.verdict.belief_error import BeliefError
-from slamreplay.verdict.judgement import Interval
+from slamreplay.verdict.judgement import FailureKind, Interval
 from slamreplay.verdict.limits import Limits
 from slamreplay.verdict.timing import Delay
 from slamreplay.verdict.wheels import Wheels
 
 #: A pose that somebody set this shortly before the loss is what made it so.
 RESET_NS = 5 * NS_PER_S
+#: An episode that lasts this long is more than a filter that settles.
+LASTING_NS = 10 * NS_PER_S
+
+#: A cause, how sure it is (0 to 1, None where it is no cause), and the sentences that show it.
+Answer = tuple[FailureKind, float | None, list[str]]
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,8 +11,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from slamreplay.geometry.times import NS_PER_S
-from slamreplay.verdict import causes
-from slamreplay.verdict.case import Case
+from slamreplay.verdict import causes_motion, causes_pose, causes_scans
+from slamreplay.verdict.case import LASTING_NS, Answer, Case
 from slamreplay.verdict.intervals import episodes
 from slamreplay.verdict.judgement import FailureMode, Interval
 from slamreplay.verdict.limits import Limits
@@ -30,18 +30,18 @@ def failure_mode(case: Case) -> FailureMode:
     worst = _telling(lost, case.limits)
     onset = case.since_lost(worst)
     bold = bold_words(case.error, worst, case.sigma_belief_m, case.start_ns)
-    questions: tuple[Callable[[], causes.Answer | None], ...] = (
-        lambda: causes.told_otherwise(case, worst),
-        lambda: causes.from_the_start(case, worst, onset),
-        lambda: causes.moved_otherwise(case, onset),
-        lambda: causes.was_set(case, onset),
-        lambda: causes.blind(case, onset),
-        lambda: causes.late(case, onset),
-        lambda: causes.changed_map(case, onset),
-        lambda: causes.pulled(case, worst, onset, causes.JUMP_M if bold else 0.0),
-        lambda: causes.sure_of_itself(case, onset) if bold else None,
-        lambda: causes.uncalibrated(case, onset),
-        lambda: causes.drifted(case, worst, onset),
+    questions: tuple[Callable[[], Answer | None], ...] = (
+        lambda: causes_pose.told_otherwise(case, worst),
+        lambda: causes_pose.from_the_start(case, worst, onset),
+        lambda: causes_motion.moved_otherwise(case, onset),
+        lambda: causes_pose.was_set(case, onset),
+        lambda: causes_scans.blind(case, onset),
+        lambda: causes_scans.late(case, onset),
+        lambda: causes_scans.changed_map(case, onset),
+        lambda: causes_scans.pulled(case, worst, onset, causes_scans.JUMP_M if bold else 0.0),
+        lambda: causes_motion.sure_of_itself(case, onset) if bold else None,
+        lambda: causes_motion.uncalibrated(case, onset),
+        lambda: causes_motion.drifted(case, worst, onset),
     )
     for ask in questions:
         answer = ask()
@@ -58,7 +58,7 @@ def failure_mode(case: Case) -> FailureMode:
 def _not_lost(case: Case) -> FailureMode:
     changed = [i for i in case.intervals if i.is_changed]
     delay = case.delay
-    late = delay is not None and delay.is_significant and abs(delay.seconds) >= causes.DELAY_S
+    late = delay is not None and delay.is_significant and abs(delay.seconds) >= causes_scans.DELAY_S
     words = (delay.text,) if delay is not None and late else ()
     if sum(i.duration_ns for i in changed) / NS_PER_S >= case.limits.total_s:
         told = changed_words(changed, case.hindsight, case.start_ns)
@@ -75,6 +75,6 @@ def _telling(lost: Sequence[Interval], limits: Limits) -> Interval:
     for i in lost:
         far = (i.max_error_m or 0.0) >= CLEAR * limits.position_m
         turned = (i.max_error_rad or 0.0) >= CLEAR * limits.yaw_rad
-        if far or turned or i.duration_ns >= causes.LASTING_NS:
+        if far or turned or i.duration_ns >= LASTING_NS:
             return i
     return lost[0]
