@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 
 from slamreplay.bundle.belief import recorded_belief
-from slamreplay.bundle.findings import Finding
 from slamreplay.bundle.products import Hindsight
 from slamreplay.bundle.track import PoseTrack
 from slamreplay.bundle.view import BundleView
@@ -20,11 +19,12 @@ from slamreplay.verdict.intervals import log_state
 from slamreplay.verdict.judgement import FailureMode, Interval, Judgement, State
 from slamreplay.verdict.lacking import lacking
 from slamreplay.verdict.limits import Limits
-from slamreplay.verdict.map_fit import MapFit, map_fit
+from slamreplay.verdict.map_fit import map_fit
 from slamreplay.verdict.stops import stop_findings, stops
 from slamreplay.verdict.summary import summary
 from slamreplay.verdict.tiles import Evidence, gathered, intervals_of
 from slamreplay.verdict.timing import Delay, scan_delay
+from slamreplay.verdict.unjudged import unjudged
 from slamreplay.verdict.weak_evidence import doubt_of_map
 from slamreplay.verdict.wheels import Wheels, wheels
 
@@ -52,12 +52,12 @@ def judge(
     if belief is not None and not belief.has_pose.any():
         belief = None
     if hindsight is None or not len(hindsight.track):
-        return _unjudged(view, belief, hindsight, limits)
+        return unjudged(view, belief, hindsight, limits)
     fit = map_fit(view, hindsight, limits)
     if not fit.fits:
-        return _unjudged(view, belief, hindsight, limits, fit=fit)
+        return unjudged(view, belief, hindsight, limits, fit=fit)
     if hindsight.margin is not None and hindsight.margin < limits.margin:
-        return _unjudged(view, belief, hindsight, limits, ambiguous=True)
+        return unjudged(view, belief, hindsight, limits, ambiguous=True)
     delay = scan_delay(view, hindsight)
     evidence = gathered(view, belief, hindsight, limits, delay)
     intervals = intervals_of(view, evidence, limits)
@@ -156,54 +156,3 @@ def _log_confidence(state: State, intervals: tuple[Interval, ...]) -> float | No
     if not sure:
         return None
     return sum(c * weight for c, weight in sure) / sum(weight for _, weight in sure)
-
-
-def _unjudged(
-    view: BundleView,
-    belief: PoseTrack | None,
-    hindsight: Hindsight | None,
-    limits: Limits,
-    *,
-    fit: MapFit | None = None,
-    ambiguous: bool = False,
-) -> Judgement:
-    """A log of which nothing can be said, as one interval; what the robot did still stands."""
-    state: State = "unobservable" if ambiguous else "insufficient_data"
-    ids: tuple[str, ...] = ("SR-LOC-002",)
-    reason = ""
-    mode = FailureMode("none", None, ())
-    if not ambiguous:
-        ids, reason = ("SR-LOC-004",), "too few scans were recorded"
-        if view.grid is None:
-            ids, reason = ("SR-MAP-002",), "there is no map to compare with"
-        elif hindsight is None:
-            reason = "there are no scans to compare with the map"
-        elif fit is not None:
-            ids, reason = ("SR-MAP-WRONG",), "its scans fit nowhere in this map"
-            words = ("no place in the map explains the scans: another floor, scale or building",)
-            mode = FailureMode("wrong_map", 0.7, words)
-    else:
-        mode = FailureMode("sensing_ambiguity", 0.7, ("two places explain all scans equally well",))
-    start = view.manifest.start_ns
-    whole = (Interval(state, start, view.manifest.end_ns, findings=ids),)
-    found_stops = stops(view, belief, None, whole)
-    done = actions(view, belief, limits)
-    text = summary(
-        state,
-        whole,
-        mode,
-        found_stops,
-        None,
-        None,
-        start_ns=start,
-        has_belief=belief is not None,
-        reason=reason,
-    )
-    findings: tuple[Finding, ...] = (
-        *verdict_findings(view, belief, hindsight, whole, None, limits, fit),
-        *risky(done),
-        *contract_findings(done),
-        *stop_findings(found_stops, start),
-    )
-    left = lacking(view, belief, hindsight, None)
-    return Judgement(state, None, text, whole, mode, found_stops, done, findings, lacking=left)
