@@ -6,39 +6,17 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 
 from slamreplay import __version__
-from slamreplay.bundle.findings import FINDINGS, SEVERITIES, Explanation
 from slamreplay.bundle.manifest import Manifest
 from slamreplay.geometry.times import NS_PER_S
 from slamreplay.report import phrases, tables
 from slamreplay.report.assess import not_assessable, title_of
 from slamreplay.report.evidence import Postmortem
 from slamreplay.report.facts import Fact, deciding_facts
-from slamreplay.report.phrases import percent, seconds, short, span
+from slamreplay.report.finding_rows import FindingRow, finding_rows
+from slamreplay.report.phrases import percent, seconds
 from slamreplay.report.tables import Table, table
+from slamreplay.report.timeline import Band, bands, marks
 from slamreplay.report.words import FAILURE_MODES, STATES, StateWords
-
-
-@dataclass(frozen=True)
-class Band:
-    """A stretch of the timeline: its place in thousandths of the log."""
-
-    state: str
-    x: float
-    width: float
-    title: str
-
-
-@dataclass(frozen=True)
-class FindingRow:
-    """A finding with its explanation."""
-
-    id: str
-    severity: str
-    title: str
-    message: str
-    when: str
-    numbers: str
-    explanation: Explanation | None
 
 
 @dataclass(frozen=True)
@@ -101,8 +79,8 @@ def page(post: Postmortem) -> Page:
         failure_mode=_failure_mode(post),
         evidence=judgement.failure_mode.evidence,
         lacking=judgement.lacking,
-        bands=_bands(post),
-        marks=_marks(post),
+        bands=bands(post),
+        marks=marks(post),
         end=seconds(manifest.end_ns - manifest.start_ns),
         legend=tuple((state, STATES[state].name) for state in seen),
         intervals=tables.intervals(post),
@@ -110,7 +88,7 @@ def page(post: Postmortem) -> Page:
         actions=tables.actions(post),
         regions=tables.regions(post),
         trials=tables.trials(post),
-        findings=_findings(post),
+        findings=finding_rows(post),
         unasked=tuple((i, title_of(i), why) for i, why in not_assessable(post).items()),
         missing=tuple((m.part, m.reason, m.consequence) for m in manifest.missing),
         audit=_audit(manifest),
@@ -165,66 +143,6 @@ def _failure_mode(post: Postmortem) -> str:
         return ""
     sure = "" if mode.confidence is None else f" ({percent(mode.confidence)})"
     return f"{FAILURE_MODES[mode.kind]}{sure}"
-
-
-def _bands(post: Postmortem) -> tuple[Band, ...]:
-    start, whole = post.manifest.start_ns, max(post.manifest.end_ns - post.manifest.start_ns, 1)
-    return tuple(
-        Band(
-            i.state,
-            round(1000.0 * (i.start_ns - start) / whole, 3),
-            round(1000.0 * (i.end_ns - i.start_ns) / whole, 3),
-            f"{STATES[i.state].name}: {span(post, i.start_ns, i.end_ns)}",
-        )
-        for i in post.judgement.intervals
-    )
-
-
-def _marks(post: Postmortem) -> tuple[Band, ...]:
-    start, whole = post.manifest.start_ns, max(post.manifest.end_ns - post.manifest.start_ns, 1)
-    return tuple(
-        Band(
-            s.state,
-            round(1000.0 * (s.t_ns - start) / whole, 3),
-            0.0,
-            f"Stop {k} at {seconds(s.t_ns - start)}",
-        )
-        for k, s in enumerate(post.judgement.stops, start=1)
-    )
-
-
-def _findings(post: Postmortem) -> tuple[FindingRow, ...]:
-    return tuple(
-        FindingRow(
-            f.id,
-            f.severity,
-            title_of(f.id),
-            f.message,
-            span(post, f.start_ns, f.end_ns),
-            _judged(f.value, f.low, f.high, f.unit, f.n, f.n_eff),
-            FINDINGS.get(f.id),
-        )
-        for f in sorted(post.findings, key=lambda f: -SEVERITIES.index(f.severity))
-    )
-
-
-def _judged(
-    value: float | None,
-    low: float | None,
-    high: float | None,
-    unit: str,
-    n: int | None,
-    n_eff: float | None,
-) -> str:
-    parts = []
-    if value is not None:
-        parts.append(f"value {short(value)} {'' if unit == '1' else unit}".rstrip())
-    if low is not None or high is not None:
-        parts.append(f"expected {short(low)} to {short(high)}")
-    if n is not None:
-        effective = "" if n_eff is None else f", worth {n_eff:.0f} independent ones"
-        parts.append(f"{n} samples{effective}")
-    return "; ".join(parts)
 
 
 def _audit(manifest: Manifest) -> tuple[tuple[str, str], ...]:

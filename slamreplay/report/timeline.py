@@ -1,0 +1,47 @@
+"""The timeline across the page: the verdict's intervals as bands, and the stops as marks."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from slamreplay.report.evidence import Postmortem
+from slamreplay.report.phrases import seconds, span
+from slamreplay.report.words import STATES
+
+
+@dataclass(frozen=True)
+class Band:
+    """A stretch of the timeline, or a moment of width 0: its place in thousandths of the log."""
+
+    state: str
+    x: float
+    width: float
+    title: str
+
+
+def bands(post: Postmortem) -> tuple[Band, ...]:
+    """One band for each interval of the verdict."""
+    start, whole = post.manifest.start_ns, max(post.manifest.end_ns - post.manifest.start_ns, 1)
+    return tuple(
+        Band(
+            i.state,
+            round(1000.0 * (i.start_ns - start) / whole, 3),
+            round(1000.0 * (i.end_ns - i.start_ns) / whole, 3),
+            f"{STATES[i.state].name}: {span(post, i.start_ns, i.end_ns)}",
+        )
+        for i in post.judgement.intervals
+    )
+
+
+def marks(post: Postmortem) -> tuple[Band, ...]:
+    """One mark for each stop."""
+    start, whole = post.manifest.start_ns, max(post.manifest.end_ns - post.manifest.start_ns, 1)
+    return tuple(
+        Band(
+            s.state,
+            round(1000.0 * (s.t_ns - start) / whole, 3),
+            0.0,
+            f"Stop {k} at {seconds(s.t_ns - start)}",
+        )
+        for k, s in enumerate(post.judgement.stops, start=1)
+    )
