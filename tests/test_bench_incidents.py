@@ -7,11 +7,12 @@ import pytest
 
 from slamreplay.bench.incidents import KINDS, incident
 from slamreplay.bench.logs import bundle_of
-from slamreplay.bench.truth import stretches
 from slamreplay.bundle.scans import scan_set
 from slamreplay.errors import UsageError
+from slamreplay.geometry.times import NS_PER_S
 from slamreplay.ingest.pipeline import ingest
 from slamreplay.simulate.topics import START_NS, records
+from slamreplay.simulate.truth import in_stretches, stretches
 from slamreplay.simulate.writer import write_log
 
 
@@ -108,14 +109,15 @@ def test_same_seed_is_the_same_incident_and_another_is_not():
     assert one.recording.scenario.mapped != other.recording.scenario.mapped
 
 
-def test_stretches_bridge_and_drop():
-    t_s = np.arange(0.0, 10.0, 0.1)
-    holds = ((t_s > 1.0) & (t_s < 3.0)) | ((t_s > 3.5) & (t_s < 5.0)) | ((t_s > 8) & (t_s < 9))
+def test_stretches_must_last_and_short_gaps_do_not_end_them():
+    t_ns = np.arange(100) * NS_PER_S // 10
+    holds = np.zeros(100, bool)
+    holds[10:25], holds[30:50], holds[70:80] = True, True, True
 
-    found = stretches(t_s, holds, 3.0, 1.0)
-
-    assert found.sum() == pytest.approx(39, abs=1)
-    assert not found[80:].any()
+    assert stretches(t_ns, holds, 2 * NS_PER_S, NS_PER_S) == [(10, 49)]
+    kept = in_stretches(t_ns, holds, 2 * NS_PER_S, NS_PER_S)
+    assert np.flatnonzero(kept).tolist() == list(range(10, 50))
+    assert stretches(t_ns, holds & False, 2 * NS_PER_S, NS_PER_S) == []
 
 
 def test_unknown_names_are_refused():

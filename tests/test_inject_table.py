@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from slamreplay.bench import inject, real, real_faults
+from slamreplay.bench import inject, moments, real_faults
 from slamreplay.bench.injection import Injection
 from slamreplay.bundle.scans import scan_set
 from slamreplay.geometry.times import NS_PER_S
@@ -21,13 +21,13 @@ def log():
 
 def test_nothing_done_makes_nothing_true(log):
     injection = Injection("none", log.view, START_NS)
-    assert not real.true_lost(injection.view, log.track_ns, log.xyyaw).any()
+    assert not moments.true_lost(injection.view, log.track_ns, log.xyyaw).any()
 
 
 def test_a_moved_belief_is_lost_from_then_on(log):
     start = START_NS + 6 * NS_PER_S
     injection = inject.wrong_start(log.view, start, (0.9, 0.0, 0.0))
-    lost = real.true_lost(injection.view, log.track_ns, log.xyyaw)
+    lost = moments.true_lost(injection.view, log.track_ns, log.xyyaw)
     assert abs(log.track_ns[np.flatnonzero(lost)[0]] - start) < 0.6 * NS_PER_S
     assert lost[log.track_ns > start + NS_PER_S].all()
 
@@ -53,17 +53,9 @@ def test_scores_leave_edges_and_uncounted_moments_out():
     true, said = np.zeros(100, bool), np.zeros(100, bool)
     true[30:60], said[33:60], said[90:] = True, True, True
     every = np.ones(100, bool)
-    score = real.scored(t_ns, true, said, every)
+    score = moments.scored(t_ns, true, said, every)
     assert (score.hits, score.missed, score.false) == (19, 0, 10)  # 36 to 54, 90 to 99
     counted = every.copy()
     counted[95:] = False  # and so are those within half a second of what is not counted
-    assert real.scored(t_ns, true, said, counted).f1 == 1.0
-    assert real.scored(t_ns, ~every, ~every, every).f1 is None
-
-
-def test_runs_must_last_and_short_gaps_do_not_end_them():
-    t_ns = np.arange(100) * NS_PER_S // 10
-    flags = np.zeros(100, bool)
-    flags[10:25], flags[30:50], flags[70:80] = True, True, True
-    kept = real.lasting(t_ns, flags, 2.0, 1.0)
-    assert np.flatnonzero(kept).tolist() == list(range(10, 50))
+    assert moments.scored(t_ns, true, said, counted).f1 == 1.0
+    assert moments.scored(t_ns, ~every, ~every, every).f1 is None

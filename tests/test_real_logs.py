@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from slamreplay.bench import inject, real
+from slamreplay.bench import inject, moments, real_rows
 from slamreplay.bundle.scans import scan_set
 from slamreplay.consistency.sensed import sensed_references
 from slamreplay.geometry import se2, se3
@@ -90,7 +90,7 @@ def aisle(real_logs, tmp_path_factory):
     folder = real_logs / "zaki_kidnap/dec13"
     options = IngestOptions(map=folder / "map/before_kidnap.yaml", end_s=60.0)
     target = tmp_path_factory.mktemp("aisle") / "b"
-    return real.recorded(ingest([folder / "target_before.bag"], target, options).view())
+    return real_rows.recorded(ingest([folder / "target_before.bag"], target, options).view())
 
 
 def test_kidnap_in_a_real_log_is_found(aisle):
@@ -102,11 +102,11 @@ def test_kidnap_in_a_real_log_is_found(aisle):
 
     found = hindsight(injection.view)
     apart = np.hypot(*(found.track.xyyaw - true)[:, :2].T)
-    lost = real.true_lost(injection.view, scans.t_ns, true)
+    lost = moments.true_lost(injection.view, scans.t_ns, true)
 
     assert np.nanpercentile(apart, 95) < 0.1
     assert lost[scans.t_ns > start + NS_PER_S].mean() > 0.95
-    row = real.row("kidnap", injection, aisle)
+    row = real_rows.row("kidnap", injection, aisle)
     assert row.lost.f1 > 0.95
 
 
@@ -114,4 +114,4 @@ def test_belief_put_aside_in_a_real_log_is_found(aisle):
     start = int(aisle.track_ns[0]) + ns(20.0)
     injection = inject.wrong_start(aisle.view, start, (1.0, 0.6, 0.4))
 
-    assert real.row("wrong start", injection, aisle).lost.f1 > 0.95
+    assert real_rows.row("wrong start", injection, aisle).lost.f1 > 0.95

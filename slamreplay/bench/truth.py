@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slamreplay.bench.incidents import Incident
+from slamreplay.bench.outlines import bbox, ends_in, passes
 from slamreplay.bench.structure import changed_solids
 from slamreplay.bundle.belief import recorded_belief
 from slamreplay.bundle.view import Bundle
@@ -25,8 +26,8 @@ from slamreplay.simulate.sensors import XYYAW_BASE_LASER, XYYAW_BASE_REAR, Lidar
 from slamreplay.simulate.topics import START_NS
 from slamreplay.simulate.worlds import Solid, World, rasterise
 
-_LOST_FOR_S, _CHANGED_FOR_S, _GAP_S, _LOG_FOR_S = 3.0, 2.0, 1.0, 5.0
-_CHANGED_SHARE, _STANDING_S = 0.08, 4.0
+#: What beams met for a shorter time in all does not count as standing.
+_STANDING_S = 4.0
 
 
 @dataclass(frozen=True)
@@ -105,8 +106,9 @@ def truth_of(incident: Incident, bundle: Bundle) -> Truth:
         far = truth.is_far(believed, own)
     share, regions = _changes(r, offset)
     t_s = (t_ns - t_ns[0]) / 1e9
-    lost = stretches(t_s, far, _LOST_FOR_S, _GAP_S)
-    changed = stretches(t_s, share > _CHANGED_SHARE, _CHANGED_FOR_S, _GAP_S)
+    lost = truth.in_stretches(t_s, far, truth.LOST_FOR_S, truth.GAP_S)
+    beyond = share > truth.CHANGED_SHARE
+    changed = truth.in_stretches(t_s, beyond, truth.CHANGED_FOR_S, truth.GAP_S)
     state = truth.verdict(t_s, far, t_s, share)
     if story.logged is not None:
         state = "insufficient_data"
@@ -123,20 +125,6 @@ def truth_of(incident: Incident, bundle: Bundle) -> Truth:
         state,
         offset,
     )
-
-
-def stretches(
-    t_s: se2.Array, holds: NDArray[np.bool_], at_least_s: float, gap_s: float
-) -> NDArray[np.bool_]:
-    """(N,) `holds` with gaps under `gap_s` closed and stretches under `at_least_s` left out."""
-    out = np.zeros(len(t_s), dtype=bool)
-    rows = np.flatnonzero(holds)
-    if not len(rows):
-        return out
-    for part in np.split(rows, np.flatnonzero(np.diff(t_s[rows]) >= gap_s) + 1):
-        if t_s[part[-1]] - t_s[part[0]] >= at_least_s:
-            out[part[0] : part[-1] + 1] = True
-    return out
 
 
 def _changes(r: Recording, offset: se2.Array) -> tuple[se2.Array, tuple[TrueRegion, ...]]:
@@ -157,14 +145,14 @@ def _changes(r: Recording, offset: se2.Array) -> tuple[se2.Array, tuple[TrueRegi
         np.add.at(valid, index, (ranges > 0.0).reshape(len(index), -1).sum(axis=1))
         reach = np.where(np.isfinite(ranges), ranges, lidar.range_max_m)
         for solid in added:
-            on = _ends_in(solid, rays, reach) & hit
+            on = ends_in(solid, rays, reach) & hit
             seen[solid.name][index] |= on.reshape(len(index), -1).any(axis=1)
         for solid in gone:
-            on = _passes(solid, rays, reach) & hit
+            on = passes(solid, rays, reach) & hit
             seen[solid.name][index] |= on.reshape(len(index), -1).any(axis=1)
     period = 1.0 / r.scenario.lidar.rate_hz
     regions = tuple(
-        TrueRegion(kind, s.name, _bbox(s, offset), float(seen[s.name].sum() * period))
+        TrueRegion(kind, s.name, bbox(s, offset), float(seen[s.name].sum() * period))
         for kind, solids in (("appeared", added), ("removed", gone))
         for s in solids
     )
@@ -181,7 +169,7 @@ def _stood(r: Recording, added: list[Solid]) -> OccupancyGrid:
         ranges = scans.ranges.astype(np.float64).ravel()
         reach = np.where(np.isfinite(ranges), ranges, -1.0)
         for s in added:
-            on = (_ends_in(s, rays, reach) & (reach > 0.0)).reshape(len(scans.t_s), -1)
+            on = (ends_in(s, rays, reach) & (reach > 0.0)).reshape(len(scans.t_s), -1)
             seconds[s.name] += float(on.any(axis=1).sum()) / lidar.rate_hz
     brief = [name for name, seen_s in seconds.items() if seen_s < _STANDING_S]
     if not brief:
@@ -203,52 +191,6 @@ def _rays(r: Recording, lidar: Lidar, scans: Scans, mount: se2.Array) -> se2.Arr
     rays = se2.compose(r.motion.poses_at(beam_t), mount)
     rays[:, 2] += np.tile(lidar.bearings, len(scans.t_s))
     return rays
-
-
-def _ends_in(solid: Solid, rays: se2.Array, reach: se2.Array) -> NDArray[np.bool_]:
-    """(N,) beams that end within a decimetre of a convex outline."""
-    x = rays[:, 0] + reach * np.cos(rays[:, 2])
-    y = rays[:, 1] + reach * np.sin(rays[:, 2])
-    return _depth(solid, x, y) < 0.1
-
-
-def _passes(solid: Solid, rays: se2.Array, reach: se2.Array) -> NDArray[np.bool_]:
-    """(N,) beams that go through a convex outline before they end (Cyrus and Beck, 1978)."""
-    dx, dy = np.cos(rays[:, 2]), np.sin(rays[:, 2])
-    enter, leave = np.zeros(len(rays)), reach.copy()
-    possible = np.ones(len(rays), dtype=bool)
-    for nx, ny, offset in _edges(solid):
-        ahead = nx * dx + ny * dy
-        outside = nx * rays[:, 0] + ny * rays[:, 1] - offset
-        with np.errstate(divide="ignore", invalid="ignore"):
-            at = -outside / ahead
-        enter = np.where(ahead < 0.0, np.maximum(enter, at), enter)
-        leave = np.where(ahead > 0.0, np.minimum(leave, at), leave)
-        possible &= (ahead != 0.0) | (outside <= 0.0)
-    return possible & (enter < leave)
-
-
-def _depth(solid: Solid, x: se2.Array, y: se2.Array) -> se2.Array:
-    """(N,) distance outside the outline's edges, negative inside."""
-    return np.max([nx * x + ny * y - offset for nx, ny, offset in _edges(solid)], axis=0)
-
-
-def _edges(solid: Solid) -> list[tuple[float, float, float]]:
-    """Outward unit normal and offset of each edge of an anticlockwise outline."""
-    corners = np.array(solid.corners)
-    out = []
-    for (ax, ay), (bx, by) in zip(corners, np.roll(corners, -1, axis=0), strict=True):
-        length = float(np.hypot(bx - ax, by - ay))
-        nx, ny = float(by - ay) / length, float(ax - bx) / length
-        out.append((nx, ny, float(nx * ax + ny * ay)))
-    return out
-
-
-def _bbox(solid: Solid, offset: se2.Array) -> tuple[float, float, float, float]:
-    corners = se2.transform_points(offset, np.array(solid.corners))
-    x0, y0 = (float(v) for v in corners.min(axis=0))
-    x1, y1 = (float(v) for v in corners.max(axis=0))
-    return x0, y0, x1, y1
 
 
 def changed_cells(r: Recording, grid: OccupancyGrid, world: World) -> NDArray[np.bool_]:

@@ -15,9 +15,11 @@ from slamreplay.geometry import se2
 from slamreplay.maps.grid import OccupancyGrid
 from slamreplay.maps.raycast import cast_rays
 
-_FAR_M, _FAR_RAD, _LOST_FOR_S = 0.5, np.radians(20.0), 3.0
-_NEAR_M, _CHANGED_SHARE, _CHANGED_FOR_S = 0.25, 0.08, 2.0
-_LOG_FOR_S, _GAP_S = 5.0, 1.0
+_FAR_M, _FAR_RAD, LOST_FOR_S = 0.5, np.radians(20.0), 3.0
+_NEAR_M, CHANGED_SHARE, CHANGED_FOR_S = 0.25, 0.08, 2.0
+#: Gaps shorter than this end no stretch that is lost or changed.
+GAP_S = 1.0
+_LOG_FOR_S = 5.0
 
 
 def is_far(belief_xyyaw: se2.Array, true_xyyaw: se2.Array) -> NDArray[np.bool_]:
@@ -65,28 +67,45 @@ def changed_beams(
     return (ranges > 0.0) & (appeared | removed)
 
 
-def total_s(
-    t_s: se2.Array, holds: NDArray[np.bool_], at_least_s: float, gap_s: float = _GAP_S
-) -> float:
-    """Total time where `holds` (N,): gaps under `gap_s` are bridged, short stretches left out."""
-    total, first, last = 0.0, np.nan, np.nan
-    for t in [*t_s[holds], np.inf]:
-        if not t - last < gap_s:
-            total += last - first if last - first >= at_least_s else 0.0
-            first = t
-        last = t
-    return float(total)
+def stretches(
+    t: NDArray, holds: NDArray[np.bool_], at_least: float, gap: float
+) -> list[tuple[int, int]]:
+    """First and last row of each stretch in which something holds.
+
+    Args:
+        t: (N,) times in any unit, that of the two limits.
+        holds: (N,) flags.
+        at_least: shorter stretches are left out.
+        gap: shorter gaps are bridged.
+    """
+    rows = np.flatnonzero(holds)
+    parts = np.split(rows, np.flatnonzero(np.diff(t[rows]) >= gap) + 1) if len(rows) else []
+    return [(int(p[0]), int(p[-1])) for p in parts if t[p[-1]] - t[p[0]] >= at_least]
+
+
+def in_stretches(
+    t: NDArray, holds: NDArray[np.bool_], at_least: float, gap: float
+) -> NDArray[np.bool_]:
+    """(N,) rows that lie in one of the `stretches`."""
+    out = np.zeros(len(t), dtype=bool)
+    for first, last in stretches(t, holds, at_least, gap):
+        out[first : last + 1] = True
+    return out
 
 
 def verdict(
     t_s: se2.Array, far: NDArray[np.bool_], scan_t_s: se2.Array, changed_share: se2.Array
 ) -> str:
     """The state of a log, from when the belief was far off and each scan's changed share."""
-    lost = total_s(t_s, far, _LOST_FOR_S) >= _LOG_FOR_S
-    changed = total_s(scan_t_s, changed_share > _CHANGED_SHARE, _CHANGED_FOR_S) >= _LOG_FOR_S
+    lost = _total_s(t_s, far, LOST_FOR_S) >= _LOG_FOR_S
+    changed = _total_s(scan_t_s, changed_share > CHANGED_SHARE, CHANGED_FOR_S) >= _LOG_FOR_S
     if lost and changed:
         return "lost_and_map_changed"
     return "lost" if lost else "map_changed" if changed else "healthy"
+
+
+def _total_s(t_s: se2.Array, holds: NDArray[np.bool_], at_least_s: float) -> float:
+    return sum(float(t_s[b] - t_s[a]) for a, b in stretches(t_s, holds, at_least_s, GAP_S))
 
 
 def _along(rays: se2.Array, distance: se2.Array) -> se2.Array:
