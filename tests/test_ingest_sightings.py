@@ -98,6 +98,22 @@ def test_fixes_are_metres_and_their_covariance_is_turned_with_them(logs, tmp_pat
     assert reasons == {"latitude or longitude is none", "the receiver had no fix"}
 
 
+def test_fixes_without_bounds_are_counted_and_covariances_without_bounds_not_known(logs, tmp_path):
+    wide = {"position_covariance": np.full(9, np.inf), "position_covariance_type": 2}
+    values = ({"latitude": np.inf}, {"longitude": -np.inf}, wide)
+    odometry = stamped(logs, ODOM, 0, header__frame_id="odom", pose__pose__orientation__w=1.0)
+    messages = [("/odom", ODOM, odometry, 10**18)]
+    messages += [
+        ("/fix", FIX, stamped(logs, FIX, k, **v), 10**18 + k) for k, v in enumerate(values)
+    ]
+    bundle = ingest([logs.write("f.mcap", messages)], tmp_path / "b")
+    found = bundle.view().table("references")
+
+    assert len(found) == 1
+    assert np.isnan(found["covariance"][0].reshape(6, 6)[:3, :3]).all()
+    assert [x.count for x in bundle.manifest.losses if x.what == "/fix"] == [2]
+
+
 @pytest.mark.parametrize(
     ("frame", "is_tag"),
     [("tag_0", True), ("/tag36h11:12", True), ("robot/fiducial_3", True), ("tag", False),

@@ -25,9 +25,12 @@ def _decode(messages: Messages) -> Decoded:
     place[:, 2] = np.where(np.isfinite(place[:, 2]), place[:, 2], 0.0)  # receivers may lack it
     finite = np.isfinite(place).all(axis=1)
     sound = finite & (np.abs(place[:, 0]) <= 90.0) & (np.abs(place[:, 1]) <= 180.0)
+    # Not a number passes through sines and products in silence; an infinity would warn.
+    place[~sound] = np.nan
     fixed = messages.column("status.status", np.int64) > _NO_FIX
     axes = enu_axes(place[:, 0], place[:, 1])
     enu = messages.fixed("position_covariance", 9).reshape(-1, 3, 3)
+    enu = np.where(np.isfinite(enu), enu, np.nan)
     covariance = np.full((len(messages), 6, 6), np.nan)
     covariance[:, :3, :3] = np.swapaxes(axes, 1, 2) @ enu @ axes
     covariance[messages.column("position_covariance_type", np.int64) == _UNKNOWN] = np.nan
