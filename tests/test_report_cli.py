@@ -138,8 +138,9 @@ def test_commands_import_nothing_heavy():
     assert not heavy & set(done.stdout.split())
 
 
-def test_what_cannot_be_held_out_is_named(app, bundle_folder, tmp_path):
-    result = run(app, "report", bundle_folder, "-o", tmp_path / "r", "--hold-out", "survey")
+def test_what_cannot_be_held_out_is_named_before_the_log_is_read(app, tmp_path):
+    log = tmp_path / "missing.mcap"
+    result = run(app, "report", log, "-o", tmp_path / "r", "--hold-out", "survey")
 
     assert isinstance(result.exception, UsageError)
     assert "survey" in str(result.exception)

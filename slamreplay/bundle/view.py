@@ -19,6 +19,18 @@ from slamreplay.geometry.transforms import Edge, TransformBuffer
 from slamreplay.maps.grid import OccupancyGrid
 
 
+def check_held_out(kinds: Collection[str]) -> None:
+    """Refuse kinds of references that no view can hold out.
+
+    Raises:
+        UsageError: a kind that only judges anyway, or none at all.
+    """
+    for kind in kinds:
+        if kind not in SENSED_KINDS:
+            known = ", ".join(sorted(SENSED_KINDS))
+            raise UsageError(f"'{kind}' cannot be held out", hint=f"there are: {known}")
+
+
 class Bundle:
     """Read-only handle of a bundle; tables are read and checked when first asked for.
 
@@ -76,10 +88,7 @@ class Bundle:
         Raises:
             UsageError: a kind that only judges anyway, or none at all.
         """
-        for kind in hold_out:
-            if kind not in SENSED_KINDS:
-                known = ", ".join(sorted(SENSED_KINDS))
-                raise UsageError(f"'{kind}' cannot be held out", hint=f"there are: {known}")
+        check_held_out(hold_out)
         return BundleView(self, held_out=frozenset(hold_out))
 
 

@@ -89,9 +89,12 @@ def _report(
     as_json: Json = False,
 ) -> None:
     from slamreplay.bundle.atomic import check_target
+    from slamreplay.bundle.view import check_held_out
 
+    # All this before the work, not after it.
     threshold = _severity(fail_on)
-    check_target(output, "report.json")  # before the work, not after it
+    check_held_out(hold_out or ())
+    check_target(output, "report.json")
     if update_map is not None:
         from slamreplay.report.map_proposal import check_proposal_target
 
