@@ -2,6 +2,8 @@
 
 import io
 import json
+from dataclasses import replace
+from pathlib import Path
 
 import numba
 import numpy as np
@@ -55,14 +57,16 @@ def put(cells: np.ndarray, low: tuple[float, float], high: tuple[float, float]) 
     return cells
 
 
-def find(phases, poses=(POSE,), rate_hz=10.0, lost=lambda ranges: ~np.isfinite(ranges)):
+def find(phases, poses=(POSE,), rate_hz=10.0, lost=lambda ranges: ~np.isfinite(ranges), cells=None):
     """Changes in a log of (start in s, end in s, cells) phases, from each of the poses in turn.
+
+    `cells` stand in for those of the hall's map.
 
     `lost` says of ranges (N, B) which of them give nothing back.
     """
     t_ns, rows, at = [], [], []
-    for start_s, end_s, cells in phases:
-        world = OccupancyGrid(np.where(cells < 0, 100, cells), 0.05, np.zeros(3))
+    for start_s, end_s, real in phases:
+        world = OccupancyGrid(np.where(real < 0, 100, real), 0.05, np.zeros(3))
         reach = [cast_rays(world, pose, BEARINGS, 12.0)[0] for pose in poses]
         times = np.arange(start_s, end_s, 1.0 / rate_hz)
         turn = np.arange(len(times)) * len(poses) // len(times)
@@ -74,7 +78,8 @@ def find(phases, poses=(POSE,), rate_hz=10.0, lost=lambda ranges: ~np.isfinite(r
     ranges = np.where(kind == HIT, ranges, 12.0)
     ends = np.stack([ranges * np.cos(BEARINGS), ranges * np.sin(BEARINGS)], axis=-1)
     beams = Beams(np.array(t_ns), ends.astype(np.float32), kind, np.zeros(2))
-    return find_changes(hall(), working_map(hall()), beams, np.array(at))
+    grid = hall() if cells is None else replace(hall(), cells=cells)
+    return find_changes(grid, working_map(grid), beams, np.array(at))
 
 
 def test_hall_as_mapped_has_no_changes():
@@ -284,6 +289,27 @@ def test_what_was_put_back_during_the_log_is_not_proposed():
     assert proposal_files(hall(), found, "new", None)["new.pgm"] == map_files(hall(), "m")["m.pgm"]
 
 
+@pytest.mark.parametrize("low", [(3.3, 7.4), (3.4, 6.6), (6.5, 4.0)])
+def test_corrected_map_explains_the_log(low):
+    high = (low[0] + 3.0, low[1] + 0.5)
+    log = [(0, 10, put(without_rack(), low, high))]
+    before = find(log)
+    after = find(log, cells=before.corrected)
+
+    assert before.changed_share.max() > 0.05
+    assert after.changed_share.max() < 0.01
+    np.testing.assert_array_equal(after.corrected, before.corrected)
+
+
+@pytest.mark.parametrize(("came_s", "drawn"), [(4, True), (13, False)])
+def test_what_its_place_was_empty_for_longer_than_it_stood_is_not_drawn(came_s, drawn):
+    box = put(hall().cells, (7.0, 3.0), (8.2, 3.8))
+    found = find([(0, came_s, hall().cells), (came_s, 20, box)])
+
+    assert found.appeared.any()
+    assert (found.corrected != hall().cells).any() == drawn
+
+
 def test_map_that_is_not_ours_is_never_overwritten(tmp_path):
     (tmp_path / "hall.yaml").write_text("image: hall.pgm\n")
     with pytest.raises(OutputError, match="not a proposal of ours"):
@@ -320,6 +346,18 @@ def test_report_writes_the_corrected_map_and_the_freshness_layer(tmp_path):
     np.testing.assert_array_equal(new.cells, room_grid().cells)  # nothing had changed
     np.testing.assert_allclose(new.origin_xyyaw, room_grid().origin_xyyaw)
     assert pq.read_table(tmp_path / "r" / "freshness.parquet").num_rows > 1000
+
+
+def test_corrected_map_of_the_changed_aisle_is_no_longer_changed(tmp_path):
+    log = Path(__file__).parents[1] / "sample_logs" / "changed_aisle.mcap"
+    target = tmp_path / "new.yaml"
+    states = []
+    for name, more in (("old", ("--update-map", target)), ("new", ("--map", target))):
+        result = run_report(log, "-o", tmp_path / name, *more)
+        assert result.exit_code == 0, result.output
+        states.append(json.loads((tmp_path / name / "report.json").read_text())["verdict"]["state"])
+
+    assert states == ["map_changed", "healthy"]
 
 
 def turning_beams(scans: int) -> tuple[Beams, np.ndarray]:

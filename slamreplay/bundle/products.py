@@ -49,6 +49,7 @@ class Changes:
         removed_share: (N,) of it, beyond a mapped wall.
         opened: (H, W) unmapped cells beside removed walls that were seen empty; None if not known.
         freshness: when each cell was last confirmed and last contradicted.
+        corrected: (H, W) int8 the map's cells as the log's end shows them; None if not known.
     """
 
     appeared: NDArray[np.bool_]
@@ -60,6 +61,7 @@ class Changes:
     removed_share: se2.Array
     opened: NDArray[np.bool_] | None = None
     freshness: Freshness | None = None
+    corrected: NDArray[np.int8] | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import binary_propagation, distance_transform_edt, maximum_filter
@@ -10,6 +12,7 @@ from slamreplay.bundle.products import Changes
 from slamreplay.geometry import se2
 from slamreplay.hindsight.beams import HIT, INVALID, MISS, Beams
 from slamreplay.hindsight.changed_beams import BEYOND, BEYOND_M, NEARER, SILENT, BeamsOnMap, on_map
+from slamreplay.hindsight.correction import Edits, corrected, last_state
 from slamreplay.hindsight.evidence import BIN_S, Lattice, Passes, lattice, passes
 from slamreplay.hindsight.freshness import freshness_of
 from slamreplay.hindsight.gone import GONE_S, gone
@@ -17,7 +20,7 @@ from slamreplay.hindsight.reach import is_lossy, proven_reach_m
 from slamreplay.hindsight.regions import Contradictions, changed_regions
 from slamreplay.hindsight.standing import asked_cells, standing
 from slamreplay.maps.grid import OccupancyGrid
-from slamreplay.matching.field import WorkingMap
+from slamreplay.matching.field import WorkingMap, working_map
 
 
 def find_changes(
@@ -32,6 +35,19 @@ def find_changes(
         poses: (N, 3) of the base in the grid's frame, NaN where there is none.
     """
     poses = np.ascontiguousarray(poses)
+    changes, edits = _look(grid, working, beams, poses)
+
+    def look_again(now: OccupancyGrid) -> Edits | None:
+        walls = working_map(now)
+        return None if walls is None else _look(now, walls, beams, poses)[1]
+
+    return replace(changes, corrected=corrected(grid, edits, look_again))
+
+
+def _look(
+    grid: OccupancyGrid, working: WorkingMap, beams: Beams, poses: se2.Array
+) -> tuple[Changes, Edits]:
+    """What contradicts this map, and how to mend it."""
     laid = on_map(working, beams, poses)
     reach_m = proven_reach_m(beams, laid)
     blind = (beams.kind == MISS) & (laid.says == BEYOND) & ~(laid.wall_m + BEYOND_M < reach_m)
@@ -57,7 +73,7 @@ def find_changes(
     removed = _mask(working, laid.where[is_gone])
     empty = where.fine(_empty_since(where, beams, ends, passed), working.walls.shape)
     with_it = _went_with_it(working, removed, empty)
-    removed |= with_it & working.walls
+    first, removed = removed, removed | (with_it & working.walls)
     new_clear = _clear(working, where, new.slots, new.seen_s, new.through_s)
     gone_clear = _clear(working, where, away.slots, away.through_s, away.seen_s)
     regions = changed_regions(
@@ -65,7 +81,12 @@ def find_changes(
         Contradictions("appeared", appeared, is_new, laid.where, beams.t_ns, new_clear),
         Contradictions("removed", removed, is_gone, laid.where, beams.t_ns, gone_clear),
     )
-    return Changes(
+    stands, wiped = (where.fine(m, working.walls.shape) for m in last_state(where, new, away))
+    opened = _to_grid(grid, working, with_it & working.unknown)
+    occupied = _to_grid(grid, working, appeared & stands)
+    free = _to_grid(grid, working, removed & (wiped | ~first)) & grid.occupied
+    edits = Edits(occupied, (free | opened) & ~occupied)
+    changes = Changes(
         _to_grid(grid, working, appeared),
         _to_grid(grid, working, removed) & grid.occupied,
         regions,
@@ -73,9 +94,10 @@ def find_changes(
         appeared_share + removed_share,
         appeared_share,
         removed_share,
-        _to_grid(grid, working, with_it & working.unknown),
+        opened,
         freshness_of(working, where, laid, beams.t_ns, passed, new, away, removed),
     )
+    return changes, edits
 
 
 def _near_a_wall(working: WorkingMap, laid: BeamsOnMap) -> NDArray[np.bool_]:

@@ -23,15 +23,9 @@ def corrections(grid: OccupancyGrid, changes: Changes) -> tuple[NDArray, NDArray
 
     Of what changed during the log the last state counts.
     """
-    occupied, free = changes.appeared.copy(), changes.removed.copy()
-    if changes.freshness is not None:
-        for mask in (occupied, free):
-            cells = np.argwhere(mask)
-            confirmed, contradicted = changes.freshness.at(grid.centre_of(cells))
-            mask[tuple(cells[contradicted <= confirmed].T)] = False
-    if changes.opened is not None and free.any():
-        free |= changes.opened
-    return occupied, free & ~occupied
+    now = grid.cells if changes.corrected is None else changes.corrected
+    changed = now != grid.cells
+    return changed & (now == OCCUPIED), changed & (now == FREE)
 
 
 def proposal_files(
