@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from slamreplay.bundle.sightings import _covariance
 from slamreplay.geometry.geodesy import earth_from_geodetic
 from slamreplay.ingest.pipeline import ingest
 from slamreplay.ingest.sightings import is_tag_frame
@@ -121,3 +122,10 @@ def test_fixes_without_bounds_are_counted_and_covariances_without_bounds_not_kno
 )  # fmt: skip
 def test_names_of_tag_frames(frame, is_tag):
     assert is_tag_frame(frame) == is_tag
+
+
+def test_a_sighting_without_bounds_has_the_usual_covariance():
+    none, endless = np.full((1, 36), np.nan), np.diag([np.inf] * 6).reshape(1, 36)
+    turn, xy = np.array([[[0.6, -0.8, 0.0], [0.8, 0.6, 0.0], [0.0, 0.0, 1.0]]]), np.ones((1, 2))
+
+    np.testing.assert_array_equal(_covariance(endless, turn, xy), _covariance(none, turn, xy))

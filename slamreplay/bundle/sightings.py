@@ -153,7 +153,8 @@ def _covariance(covariance: se2.Array, R: se2.Array, xy: se2.Array) -> se2.Array
     out = np.zeros((len(xy), 3, 3))
     out[:, 0, 0] = out[:, 1, 1] = usual**2
     out[:, 2, 2] = _YAW**2
-    full = covariance.reshape(-1, 6, 6)
+    # An infinite variance says no more than none at all, and products of it would warn.
+    full = np.where(np.isfinite(covariance), covariance, np.nan).reshape(-1, 6, 6)
     position = (R @ full[:, :3, :3] @ np.swapaxes(R, 1, 2))[:, :2, :2]
     turn = (R @ full[:, 3:, 3:] @ np.swapaxes(R, 1, 2))[:, 2, 2]
     told = np.isfinite(position).all(axis=(1, 2)) & np.isfinite(turn) & (turn > 0.0)
