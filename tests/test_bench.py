@@ -290,7 +290,8 @@ def test_goal_without_a_number_is_refused(text):
         parse_goals([text], ">=")
 
 
-@pytest.mark.parametrize("name", ["found", "lost.f2", "calibration.bins.x", "lost"])
+@pytest.mark.parametrize("name", ["found", "lost.f2", "calibration.bins.x", "calibration.bins",
+                                  "lost"])  # fmt: skip
 def test_goal_for_a_figure_that_is_not_there_is_refused(name):
     with pytest.raises(UsageError):
         missed(scores([made_up()]), parse_goals([f"{name}=0.5"], ">="))

@@ -49,9 +49,10 @@ def missed(scores: Mapping[str, Any], goals: Sequence[Goal]) -> list[str]:
             if not isinstance(found, Mapping) or part not in found:
                 raise UsageError(f"there is no figure '{'.'.join(goal.path)}' in the results")
             found = found[part]
-        value = found[0] if isinstance(found, list | tuple) else found
-        if isinstance(value, Mapping | str):
-            raise UsageError(f"'{'.'.join(goal.path)}' is no number", hint=", ".join(found))
+        value = found[0] if isinstance(found, list | tuple) and found else found
+        if not isinstance(value, int | float | None):
+            hint = ", ".join(found) if isinstance(found, Mapping) else None
+            raise UsageError(f"'{'.'.join(goal.path)}' is no number", hint=hint)
         is_met = value is not None and (
             value >= goal.bound if goal.sense == ">=" else value <= goal.bound
         )
