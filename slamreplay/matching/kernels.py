@@ -2,6 +2,8 @@
 
 The kernels work on scalars and on arrays they are handed: each array expression inside one would
 cost half a second of compilation. They do without Python's lock, so that threads may share jobs.
+They stand in one file because numba compiles a cached kernel again when its own file changes, and
+not when that of a kernel it calls does.
 """
 
 from __future__ import annotations
@@ -9,6 +11,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+#: A point damps a step as much as a measurement of this standard deviation would.
 DAMPING_SIGMA_M = 0.1
 
 
@@ -178,6 +181,7 @@ def _derivatives(  # type: ignore[no-untyped-def]
     values, resolution, x0, y0, points, pose, sums, gradient, information
 ):
     """Central differences of the summed score: its gradient and minus its second derivatives."""
+    # One cell, and the turn that moves a point 5 m away by one cell of 0.05 m.
     h, turn = resolution, 0.01
     for k in range(3):
         yaw = pose[2] + (k - 1) * turn
@@ -200,7 +204,10 @@ def _derivatives(  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True)
 def _newton_step(A, b, step):  # type: ignore[no-untyped-def]
-    """Write x of A x = b, for a symmetric 3x3 A, by cofactors, into `step`, kept short."""
+    """Write x of A x = b, for a symmetric 3x3 A, by cofactors, into `step`.
+
+    A step is kept within 0.1 m and 0.05 rad: the curvature that made it was taken over one cell.
+    """
     c00 = A[1, 1] * A[2, 2] - A[1, 2] * A[2, 1]
     c01 = A[1, 2] * A[2, 0] - A[1, 0] * A[2, 2]
     c02 = A[1, 0] * A[2, 1] - A[1, 1] * A[2, 0]
@@ -216,7 +223,26 @@ def _newton_step(A, b, step):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True)
 def climb_up(values, resolution, x0, y0, points, pose, information, sums, damped, small):  # type: ignore[no-untyped-def]
-    """Move `pose` to the top of the score; leave its curvature in `information`."""
+    """Move `pose` to the top of the score; leave its curvature in `information`.
+
+    Newton's method, damped as Levenberg (1944) does: more after a step that did not climb, less
+    after one that did.
+
+    Args:
+        values: (H, W) of the field.
+        resolution: edge of a cell, m.
+        x0: of the field's corner, m.
+        y0: of the field's corner, m.
+        points: (P, 2) of the cloud, m.
+        pose: (3,), moved in place.
+        information: (3, 3), written.
+        sums: (3, 3, 3) scratch.
+        damped: (3, 3) scratch.
+        small: (3, 3) scratch.
+
+    Returns:
+        The summed score at the top.
+    """
     count = points.shape[0]
     gradient, step, scale = small[0], small[1], small[2]
     # Damping goes with the number of points and their lever, so that a direction which no point

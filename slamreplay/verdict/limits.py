@@ -21,7 +21,7 @@ class Limits:
         margin: hindsight whose best sequence of places beats the best different one by less than
             this mean score per scan cannot tell them apart.
         lead: an unjudged moment whose place beats the best different one by less than this mean
-            score of its stretch is unobservable rather than short of data.
+            score of its stretch is unobservable rather than short of data; hindsight's own limit.
         fits_from: a log whose typical scan scores less (0 to 1) fits nowhere in the map.
         fits_well_from: one that scores less than this fits only if the best sequence of places
             beats the best different one by `clear_margin`.

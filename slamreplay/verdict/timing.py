@@ -140,6 +140,7 @@ def _seen(
     asked = np.flatnonzero(np.isfinite(here).all(axis=1))
     clouds = [thin(scans.points(row), 0.1) for row in rows[asked].tolist()]
     tops = match_each(field, clouds, here[asked], window)
+    # A match elsewhere, a poor one or one of few points says nothing of the heading.
     near = np.hypot(*(tops.xyyaw - here[asked])[:, :2].T) < 0.3
     fits = near & (tops.score > 0.4) & (np.array([len(c) for c in clouds]) >= 20)
     out[asked[fits]] = tops.xyyaw[fits, 2] + working.origin_xyyaw[2]
