@@ -62,8 +62,9 @@ FINDINGS: dict[str, Explanation] = {
     ),
     "SR-LOC-002": Explanation(
         "More than one place explains the log",
-        "Does a different place in the map explain all scans as well as the best one?",
-        "Score of the best sequence of places against the best different one, per scan.",
+        "Does a different place explain all scans, or those of one stretch, as well as the best?",
+        "Mean score per scan of the best sequence of places against the best different one, over "
+        "the whole log, and of each stretch's place against its best different one.",
         "A symmetric building is honestly ambiguous; a short log may be so without symmetry.",
     ),
     "SR-LOC-003": Explanation(
