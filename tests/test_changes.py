@@ -22,6 +22,7 @@ from slamreplay.hindsight.changed_beams import on_map
 from slamreplay.hindsight.changes import find_changes
 from slamreplay.hindsight.evidence import bins_of_each, lattice, marks, passes
 from slamreplay.hindsight.occupancy import taken
+from slamreplay.hindsight.standing import nearest_empty
 from slamreplay.maps.grid import OccupancyGrid
 from slamreplay.maps.map_server import map_files, read_map
 from slamreplay.maps.raycast import cast_rays
@@ -308,6 +309,14 @@ def test_what_its_place_was_empty_for_longer_than_it_stood_is_not_drawn(came_s, 
 
     assert found.appeared.any()
     assert (found.corrected != hall().cells).any() == drawn
+
+
+def test_one_bin_in_which_beams_passed_is_noise():
+    empty = np.array([[0, 1, 0, 0, 0], [1, 0, 1, 1, 0], [0, 0, 0, 0, 0]], dtype=bool)
+
+    assert nearest_empty(empty, earlier=True).tolist() == [-np.inf, 2, -np.inf]
+    assert nearest_empty(empty, earlier=False).tolist() == [np.inf, 2, np.inf]
+    assert nearest_empty(empty[:, :0], earlier=True).tolist() == [-np.inf] * 3
 
 
 def test_map_that_is_not_ours_is_never_overwritten(tmp_path):

@@ -31,6 +31,8 @@ CREPT_SHARE, CREPT_S = 0.35, 15.0
 #: What stands is met at nearly every look at it: thin legs at this share of them or more. Where
 #: people pass again and again, or follow each other, beams reach through in between.
 STEADY_SHARE = 0.75
+#: A cell was empty if beams went through it in so many bins.
+_TWICE = 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,8 +101,8 @@ def standing(
     first, last, seen_s = runs.T[0], runs.T[1], runs.T[2] * BIN_S
     bins = np.arange(where.bin_count)
     inside = (bins >= first[:, None]) & (bins <= last[:, None])
-    until = _nearest(empty & (bins < first[:, None]), earlier=True)
-    again = _nearest(empty & (bins > last[:, None]), earlier=False)
+    until = nearest_empty(empty & (bins < first[:, None]), earlier=True)
+    again = nearest_empty(empty & (bins > last[:, None]), earlier=False)
     course = BIN_S * np.column_stack([until, first, last, again])
     looked = np.count_nonzero((seen | through) & inside, axis=1)
     steady = np.count_nonzero(seen & inside, axis=1) / np.maximum(looked, 1)
@@ -137,15 +139,18 @@ def _longest_runs(state: NDArray[np.bool_], seen: NDArray[np.bool_]) -> NDArray[
     return out
 
 
-def _nearest(empty: NDArray[np.bool_], *, earlier: bool) -> NDArray[np.float64]:
-    """(C,) last (or first) bin in which each cell was empty, -inf (or inf) without one."""
-    if not empty.size:
-        return np.full(len(empty), -np.inf if earlier else np.inf)
-    if earlier:
-        return np.where(
-            empty.any(axis=1), empty.shape[1] - 1 - np.argmax(empty[:, ::-1], axis=1), -np.inf
-        )
-    return np.where(empty.any(axis=1), np.argmax(empty, axis=1), np.inf)
+def nearest_empty(empty: NDArray[np.bool_], *, earlier: bool) -> NDArray[np.float64]:
+    """(C,) last (or first) bin in which each cell was empty, -inf (or inf) without one.
+
+    One bin alone is noise of the poses along a face: the second one counts.
+    """
+    when = empty if earlier else empty[:, ::-1]
+    later = np.cumsum(when[:, ::-1], axis=1)[:, ::-1]  # how often from this bin on
+    count = when.shape[1]
+    often = later >= _TWICE
+    second = count - 1 - np.argmax(often[:, ::-1], axis=1) if count else np.zeros(len(when))
+    out = np.where(often.any(axis=1), second, -np.inf)
+    return out if earlier else np.where(np.isfinite(out), count - 1 - out, np.inf)
 
 
 def _things(
