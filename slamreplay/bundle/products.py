@@ -14,6 +14,11 @@ from slamreplay.bundle.freshness import Freshness
 from slamreplay.bundle.track import PoseTrack
 from slamreplay.geometry import se2
 
+#: A stretch whose place leads the best different one by less than this, in mean score of its
+#: submap, is not placed by its scans. Over 1255 submaps of simulated logs the three that were wrong
+#: led by at most 0.082 and the right ones by 0.10 or more (one: 0.103).
+LEAST_LEAD = 0.085
+
 
 @dataclass(frozen=True)
 class ChangedRegion:

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from slamreplay.bundle.products import LEAST_LEAD
 from slamreplay.geometry import se2
 from slamreplay.hindsight.chain import Chain
 from slamreplay.hindsight.places import WEIGHT, Places
@@ -20,10 +21,6 @@ FITS_SCORE, FITS_MARGIN = 0.6, 0.1
 STRETCH_SCORE = 0.4
 #: Beyond this standard deviation a pose is no pose.
 SIGMA_MAX_M = 0.5
-#: A stretch whose place leads the best different one by less than this, in mean score of its
-#: submap, is not placed. Over 1255 submaps of simulated logs the three that were wrong led by at
-#: most 0.082 and the right ones by 0.10 or more (one: 0.103).
-LEAD_SCORE = 0.085
 
 
 def fits_map(places: Places) -> bool:
@@ -59,7 +56,7 @@ def trusted_keyframes(
     mean = np.bincount(stretch, weights=scored) / np.bincount(stretch)
     sigma = np.sqrt(np.linalg.eigvalsh(cov[:, :2, :2])[:, -1])
     placed = (mean[stretch] >= STRETCH_SCORE) & (sigma <= SIGMA_MAX_M)
-    leads = lead >= LEAD_SCORE
+    leads = lead >= LEAST_LEAD
     # Where most of the log has no lead it is the log that is ambiguous, and its margin says so.
     return np.asarray(placed & leads if 2 * np.count_nonzero(leads) > len(leads) else placed)
 

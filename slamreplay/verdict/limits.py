@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from slamreplay.bundle.products import LEAST_LEAD
+
 
 @dataclass(frozen=True)
 class Limits:
@@ -46,7 +48,7 @@ class Limits:
     bridge_s: float = 1.0
     total_s: float = 5.0
     margin: float = 0.01
-    lead: float = 0.085
+    lead: float = LEAST_LEAD
     fits_from: float = 0.35
     fits_well_from: float = 0.7
     clear_margin: float = 0.1
