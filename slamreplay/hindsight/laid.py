@@ -32,6 +32,7 @@ class Laid:
         keys: (K,) indices of the keyframes among the scans; none where no scan says anything.
         points: of each keyframe (M, 2) ends of its beams in the base frame.
         chain: how the keyframes lie to each other.
+        is_told: the log has odometry; nothing stands in for it.
     """
 
     motion: PoseTrack
@@ -41,6 +42,7 @@ class Laid:
     keys: NDArray[np.int64]
     points: list[se2.Array]
     chain: Chain
+    is_told: bool
 
 
 def laid_out(base: str, lasers: Sequence[ScanSet], matching: Callable[[], None]) -> Laid:
@@ -52,7 +54,8 @@ def laid_out(base: str, lasers: Sequence[ScanSet], matching: Callable[[], None])
         matching: called before the scans are matched.
     """
     motion, is_unknown = lasers[0].odometry, np.zeros(len(lasers[0].t_ns), dtype=bool)
-    if motion is None or not motion.has_pose.any():
+    is_told = motion is not None and bool(motion.has_pose.any())
+    if motion is None or not is_told:
         still = _beside([beams_of(laser, None) for laser in lasers], None)
         motion, is_unknown = motion_by_scans(base, still)
     each = [beams_of(laser, motion) for laser in lasers]
@@ -70,7 +73,7 @@ def laid_out(base: str, lasers: Sequence[ScanSet], matching: Callable[[], None])
         motion, each = matched, [beams_of(laser, matched) for laser in lasers]
         beams = _beside(each, motion)
         points, chain = _chained(beams, odometry, keys, is_unknown)
-    return Laid(motion, each, beams, odometry, keys, points, chain)
+    return Laid(motion, each, beams, odometry, keys, points, chain, is_told)
 
 
 def odometry_at(motion: PoseTrack, t_ns: NDArray[np.int64]) -> se2.Array:

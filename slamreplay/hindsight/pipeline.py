@@ -18,8 +18,9 @@ from slamreplay.bundle.view import BundleView
 from slamreplay.geometry import se2
 from slamreplay.geometry.covariance import turned
 from slamreplay.hindsight.beams import Beams, interleaved
+from slamreplay.hindsight.bridging import bridged
 from slamreplay.hindsight.carry import carry, scan_scores, settle
-from slamreplay.hindsight.chain import Chain
+from slamreplay.hindsight.chain import Chain, torn_links
 from slamreplay.hindsight.changes import find_changes
 from slamreplay.hindsight.heirs import with_heirs
 from slamreplay.hindsight.laid import laid_out
@@ -121,6 +122,10 @@ def _rebuilt(
     say("every scan", 0.8)
     lead = keyframe_leads(places, found, len(keys))
     trusted = trusted_keyframes(places, chain, is_open, cov, key_scores, lead)
+    if laid.is_told:
+        told = odometry[keys]
+        back = bridged(poses, cov, is_open, trusted, told, torn_links(chain, told))
+        poses, cov, is_open, trusted = back.xyyaw, back.cov, back.is_open, back.has_place
     carried, share, doubt = carry(odometry, keys, poses, is_open, beams, field)
     carried, scan_cov = settle(carried, cov[share], odometry, keys[share], doubt, beams, field)
     carried[~trusted[share]], scan_cov[~trusted[share]] = np.nan, np.nan
