@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from slamreplay.bench import faults
+from slamreplay.bench import faults, tours
 from slamreplay.bench.conditions import CONDITIONS, conditioned, world_of
 from slamreplay.bench.crowds import crowd
 from slamreplay.errors import UsageError
@@ -84,7 +84,7 @@ def _story(kind: str, rng: np.random.Generator, conditions: tuple[str, ...]) -> 
     """One try: None where the tour comes too near to something or lasts too long or short."""
     place = world_of(kind, rng, conditions)
     floor = Floor.of(place.world)
-    story = faults.on_tour(kind, place, floor, rng)
+    story = tours.on_tour(kind, place, floor, rng)
     if story is None:
         return None
     motion = drive(story.start, story.tour)
