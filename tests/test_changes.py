@@ -22,6 +22,7 @@ from slamreplay.hindsight.changed_beams import on_map
 from slamreplay.hindsight.changes import find_changes
 from slamreplay.hindsight.evidence import bins_of_each, lattice, marks, passes
 from slamreplay.hindsight.occupancy import taken
+from slamreplay.hindsight.regions import confidence
 from slamreplay.hindsight.standing import nearest_empty
 from slamreplay.maps.grid import OccupancyGrid
 from slamreplay.maps.map_server import map_files, read_map
@@ -309,6 +310,13 @@ def test_what_its_place_was_empty_for_longer_than_it_stood_is_not_drawn(came_s, 
 
     assert found.appeared.any()
     assert (found.corrected != hall().cells).any() == drawn
+
+
+def test_region_is_surer_the_more_often_and_the_more_clearly_it_was_seen():
+    assert confidence(1.0, 5) == pytest.approx(6 / 7)
+    assert confidence(0.7, 5000) == confidence(1.0, 5000) == 0.99
+    assert confidence(0.35, 5000) == pytest.approx(0.5, abs=1e-3)
+    assert confidence(0.0, 5000) == 0.0
 
 
 def test_one_bin_in_which_beams_passed_is_noise():

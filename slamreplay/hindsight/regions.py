@@ -26,6 +26,8 @@ LENGTH_M, SMALLEST_M = 0.3, 0.3
 NEAR_M, SEEN_SHARE, FAR_M = 3.0, 0.6, 10.0
 #: The mapped thing that a removed patch is part of: no larger, and the patch is so much of it.
 THING_M, PATCH_SHARE = 10.0, 0.15
+#: Regions seen as the change says for this share of the time were all true; nothing is surer.
+_CLEAR_SHARE, _SUREST = 0.7, 0.99
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,10 +102,25 @@ def _patches(working: WorkingMap, found: Contradictions) -> list[_Patch]:
             int(found.t_ns[scans[0]]),
             int(found.t_ns[scans[-1]]),
             len(scans),
-            clear * float(1.0 - np.exp(-len(scans) / 10.0)),
+            confidence(clear, len(scans)),
         )
         patches.append(_Patch(region, centres, own))
     return patches
+
+
+def confidence(clear: float, views: int) -> float:
+    """How often a region like this one is a true change, 0 to 1.
+
+    A rule of succession over its views, less where it was often seen otherwise. In 60 simulated
+    development logs 317 of 317 regions were true, 3 of them with `clear` below 0.7 and 7 with fewer
+    than 20 views; logs of another simulator had three false ones, with `clear` of 0.07, 0.18 and
+    0.45 and 6, 8 and 15 views. So few false ones prove little: nothing is said above 0.99.
+
+    Args:
+        clear: share of the time for which its cells were seen as the change says, 0 to 1.
+        views: number of scans that saw it.
+    """
+    return min(_SUREST, min(1.0, clear / _CLEAR_SHARE) * (views + 1.0) / (views + 2.0))
 
 
 def _things(working: WorkingMap, old: list[_Patch]) -> list[se2.Array]:
@@ -223,5 +240,6 @@ def _moved(
         first_seen_ns=min(new.first_seen_ns, old.first_seen_ns),
         last_seen_ns=max(new.last_seen_ns, old.last_seen_ns),
         views=new.views + old.views,
-        confidence=min(new.confidence, old.confidence) * alike,
+        # Of 29 pairs in development logs 25 were right; 0.80 is what this says of them in the mean.
+        confidence=min(new.confidence, old.confidence) * float(np.sqrt(alike)),
     )
