@@ -6,16 +6,17 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import binary_propagation, distance_transform_edt, maximum_filter
+from scipy.ndimage import distance_transform_edt
 
 from slamreplay.bundle.products import Changes
 from slamreplay.geometry import se2
 from slamreplay.hindsight.beams import HIT, INVALID, MISS, Beams
 from slamreplay.hindsight.changed_beams import BEYOND, BEYOND_M, NEARER, SILENT, BeamsOnMap, on_map
 from slamreplay.hindsight.correction import Edits, corrected, last_state
-from slamreplay.hindsight.evidence import BIN_S, Lattice, Passes, lattice, passes
+from slamreplay.hindsight.emptied import empty_since, went_with_it
+from slamreplay.hindsight.evidence import Lattice, lattice, passes
 from slamreplay.hindsight.freshness import freshness_of
-from slamreplay.hindsight.gone import GONE_S, gone
+from slamreplay.hindsight.gone import gone
 from slamreplay.hindsight.reach import is_lossy, proven_reach_m
 from slamreplay.hindsight.regions import Contradictions, changed_regions
 from slamreplay.hindsight.standing import asked_cells, standing
@@ -71,8 +72,8 @@ def _look(
     removed_share = np.count_nonzero(is_gone, axis=1) / valid
     appeared = _mask(working, laid.where[is_new])
     removed = _mask(working, laid.where[is_gone])
-    empty = where.fine(_empty_since(where, beams, ends, passed), working.walls.shape)
-    with_it = _went_with_it(working, removed, empty)
+    empty = where.fine(empty_since(where, beams, ends, passed), working.walls.shape)
+    with_it = went_with_it(working, removed, empty)
     first, removed = removed, removed | (with_it & working.walls)
     new_clear = _clear(working, where, new.slots, new.seen_s, new.through_s)
     gone_clear = _clear(working, where, away.slots, away.through_s, away.seen_s)
@@ -144,39 +145,6 @@ def _mask(working: WorkingMap, index: NDArray[np.int32]) -> NDArray[np.bool_]:
     mask = np.zeros(working.walls.size, dtype=bool)
     mask[index] = True
     return mask.reshape(working.walls.shape)
-
-
-def _empty_since(
-    where: Lattice, beams: Beams, ends: NDArray[np.int64], passed: Passes
-) -> NDArray[np.bool_]:
-    """(H, W) evidence cells that beams went through, and near which nothing was seen after that."""
-    seen = np.full(where.shape, -where.bin_count, dtype=np.int32)
-    at = ends >= 0
-    bins = np.broadcast_to(where.bins[:, None], beams.kind.shape)[beams.kind == HIT][at]
-    np.maximum.at(seen.ravel(), ends[at], bins)
-    near = maximum_filter(seen, 2 * round(BEYOND_M / where.cell_m) + 1)
-    went = np.where(passed.last >= 0, where.bins[np.maximum(passed.last, 0)], -1)
-    long_enough = round(GONE_S / BIN_S)
-    return np.asarray((passed.bin_count >= long_enough) & (went >= near + long_enough))
-
-
-def _went_with_it(
-    working: WorkingMap, removed: NDArray[np.bool_], empty: NDArray[np.bool_]
-) -> NDArray[np.bool_]:
-    """(H, W) walls and unmapped cells seen empty that hang together with walls that are gone.
-
-    Beams say of the first wall alone that it is gone. A rack has an inside that nobody mapped, and
-    a back.
-
-    Args:
-        working: the map.
-        removed: (H, W) the walls that beams met first.
-        empty: (H, W) cells seen empty.
-    """
-    room = empty & (working.walls | working.unknown)
-    near = maximum_filter(removed, 2 * round(BEYOND_M / working.resolution_m) + 1)
-    start = removed | (near & room)
-    return np.asarray(binary_propagation(start, np.ones((3, 3), dtype=bool), mask=start | room))
 
 
 def _clear(
