@@ -97,14 +97,15 @@ def verdict(
     t_s: se2.Array, far: NDArray[np.bool_], scan_t_s: se2.Array, changed_share: se2.Array
 ) -> str:
     """The state of a log, from when the belief was far off and each scan's changed share."""
-    lost = _total_s(t_s, far, LOST_FOR_S) >= _LOG_FOR_S
-    changed = _total_s(scan_t_s, changed_share > CHANGED_SHARE, CHANGED_FOR_S) >= _LOG_FOR_S
+    lost = total_s(t_s, far, LOST_FOR_S) >= _LOG_FOR_S
+    changed = total_s(scan_t_s, changed_share > CHANGED_SHARE, CHANGED_FOR_S) >= _LOG_FOR_S
     if lost and changed:
         return "lost_and_map_changed"
     return "lost" if lost else "map_changed" if changed else "healthy"
 
 
-def _total_s(t_s: se2.Array, holds: NDArray[np.bool_], at_least_s: float) -> float:
+def total_s(t_s: se2.Array, holds: NDArray[np.bool_], at_least_s: float) -> float:
+    """Seconds for which something holds in all, `GAP_S` bridged, shorter stretches left out."""
     return sum(float(t_s[b] - t_s[a]) for a, b in stretches(t_s, holds, at_least_s, GAP_S))
 
 
