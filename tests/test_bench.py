@@ -307,3 +307,21 @@ def test_shipped_reliability_was_measured_on_many_moments():
     assert best is not None
     assert best.moments > 1000
     assert best.right > 0.9
+
+
+def test_sustained_level_is_what_the_verdicts_rule_would_keep():
+    from slamreplay.bench.measure import sustained
+    from slamreplay.verdict.limits import Limits
+    from slamreplay.verdict.timeline import BAD, GOOD, held, settled
+
+    rng = np.random.default_rng(3)
+    t_ns = np.arange(0, 400, dtype=np.int64) * 100_000_000
+    values = np.repeat(rng.uniform(0.0, 3.0, 40), 10)
+    limits = Limits()
+    level = sustained(t_ns, values, t_ns, limits)
+    for limit in (0.5, 1.0, 1.7):
+        flags = np.where(values > limit, BAD, GOOD).astype(np.int8)
+        line = settled(held(t_ns, flags, 0, int(t_ns[-1]) + 1, 10**9), 3 * 10**9, 10**9)
+        bad = [(s.start_ns, s.end_ns) for s in line if s.value == BAD]
+        said = np.array([any(a <= t < b for a, b in bad) for t in t_ns])
+        assert np.mean(said == (level > limit)) > 0.98

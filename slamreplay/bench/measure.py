@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import distance_transform_edt
+from scipy.ndimage import distance_transform_edt, grey_closing, grey_opening
 
 from slamreplay.bench.baselines import FIELD_THRESHOLDS, baseline_scores
 from slamreplay.bench.incidents import Incident, incident
@@ -17,17 +17,25 @@ from slamreplay.bench.truth import Truth, changed_cells
 from slamreplay.bundle.belief import recorded_belief
 from slamreplay.bundle.products import ChangedRegion, Hindsight
 from slamreplay.bundle.scans import scan_set
+from slamreplay.bundle.track import PoseTrack
+from slamreplay.bundle.view import BundleView
 from slamreplay.geometry import se2
+from slamreplay.geometry.times import ns
 from slamreplay.hindsight.pipeline import hindsight
 from slamreplay.maps.grid import OccupancyGrid
 from slamreplay.postmortem import belief_times
-from slamreplay.verdict.belief_error import belief_error
 from slamreplay.verdict.judge import judge
 from slamreplay.verdict.judgement import Judgement
 from slamreplay.verdict.limits import Limits
+from slamreplay.verdict.tiles import gathered
+from slamreplay.verdict.timing import scan_delay
 
 #: A change counts as there to be found from here on; around it nothing is called false, m.
 _SEEN_S, _AROUND_M, _TOUCH_M = 4.0, 0.3, 0.15
+#: Times between which a level is held.
+_STEP_S = 0.05
+#: A scan of another laser says what holds for so long.
+_NEAR_S = 0.15
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,8 +51,8 @@ def measured(case: Case) -> Measured:
     """Play a case through all stages.
 
     Moments: t_s; lost, changed by truth; judged_lost, judged_changed; unjudged; confidence of the
-    interval; error_m, error_rad of hindsight; ratio (how far the belief is from hindsight, in
-    limits of lost); changed_share by truth and by hindsight; the baselines' scores.
+    interval; error_m, error_rad of hindsight; ratio (how far and long the belief is from hindsight,
+    in limits of lost); changed_share by truth and by hindsight; the baselines' scores.
     """
     made = incident(case.kind, case.seed, case.conditions)
     bundle, truth = bundle_of(made)
@@ -59,14 +67,15 @@ def measured(case: Case) -> Measured:
         "true_share": truth.changed_share,
         **_judged(judgement, truth.t_ns),
         **_hindsight_error(found, truth),
-        **_ratio(found, belief, truth.t_ns),
+        **_ratio(view, found, belief, truth.t_ns),
     }
     laser = scan_set(view)
     for name, scores in baseline_scores(view).items():
         at = np.full(len(truth.t_ns), np.nan)
-        if laser is not None and len(laser):
-            row = np.clip(np.searchsorted(laser.t_ns, truth.t_ns), 0, len(laser) - 1)
-            at = np.where(laser.t_ns[row] == truth.t_ns, scores[row], np.nan)
+        if laser is not None and len(laser):  # of two lasers it may be the other one
+            row = _latest(laser.t_ns, truth.t_ns)
+            is_near = np.abs(truth.t_ns - laser.t_ns[row]) <= ns(_NEAR_S)
+            at = np.where(is_near, scores[row], np.nan)
         moments[name] = at
     assert set(FIELD_THRESHOLDS) <= set(moments)
     facts = {
@@ -115,14 +124,47 @@ def _hindsight_error(found: Hindsight | None, truth: Truth) -> dict[str, NDArray
     }
 
 
-def _ratio(found: Hindsight | None, belief: Any, t_ns: NDArray[np.int64]) -> dict[str, NDArray]:
+def _ratio(
+    view: BundleView,
+    found: Hindsight | None,
+    belief: PoseTrack | None,
+    t_ns: NDArray[np.int64],
+) -> dict[str, NDArray]:
+    """The largest limit of lost at which the verdict's own rule would call each moment lost.
+
+    Sweeping the limit gives the verdict's ROC: like the verdict, it takes late stamps and the
+    offset of a map frame off, bridges short interruptions, and lets what is too short pass.
+    """
     if found is None or belief is None or not len(found.track):
         return {"ratio": np.full(len(t_ns), np.nan)}
     limits = Limits()
-    error = belief_error(belief, found, limits)
+    error = gathered(view, belief, found, limits, scan_delay(view, found)).error
     ratio = np.fmax(error.distance_m / limits.position_m, error.heading_rad / limits.yaw_rad)
-    row = np.clip(np.searchsorted(error.t_ns, t_ns), 0, len(error.t_ns) - 1)
-    return {"ratio": np.where(error.t_ns[row] == t_ns, ratio[row], np.nan)}
+    return {"ratio": sustained(error.t_ns, ratio, t_ns, limits)}
+
+
+def sustained(
+    t_ns: NDArray[np.int64], values: se2.Array, at_ns: NDArray[np.int64], limits: Limits
+) -> se2.Array:
+    """(M,) levels that values (N,) at sorted times (N,) keep for as long as lost must last.
+
+    A grey closing and opening over time (Serra, 1982): at every threshold what stays above it is
+    what `slamreplay.verdict.timeline.settled` would keep. NaN where nothing is known.
+    """
+    step_ns = ns(_STEP_S)
+    grid = np.arange(int(t_ns[0]), int(t_ns[-1]) + step_ns, step_ns)
+    level = values[_latest(t_ns, grid)]
+    bridge, least = (round(s / _STEP_S) for s in (limits.bridge_s, limits.lost_s))
+    around = bridge + least  # beyond the log nothing is known
+    level = np.pad(np.where(np.isnan(level), -np.inf, level), around, constant_values=-np.inf)
+    level = grey_opening(grey_closing(level, bridge), least)[around:-around]
+    level = level[_latest(grid, at_ns)]
+    return np.where(np.isfinite(level), level, np.nan)
+
+
+def _latest(t_ns: NDArray[np.int64], at_ns: NDArray[np.int64]) -> NDArray[np.int64]:
+    """(M,) rows of sorted times (N,) that are the last ones at or before each time."""
+    return np.clip(np.searchsorted(t_ns, at_ns, side="right") - 1, 0, None)
 
 
 def _regions(
