@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from slamreplay.geometry import se2
-from slamreplay.hindsight.chain import POOR, scan_matched
+from slamreplay.hindsight.chain import MEMORY, POOR, Known, scan_matched
 
 
 def wall(x0, y0, x1, y1):
@@ -59,3 +59,23 @@ def test_a_good_match_is_believed_against_odometry(slip):
     assert chain.is_solid.tolist() == [True, True, True, False, True, True]
     truth = se2.between(np.array(WAY[0]), np.array(WAY))
     np.testing.assert_allclose(se2.between(chain.xyyaw[0], chain.xyyaw), truth, atol=0.05)
+
+
+def test_matches_that_still_hold_are_not_made_again():
+    way = [(1.5 + 0.05 * k, 2.0, 0.05 * k) for k in range(2 * MEMORY + 4)]
+    odometry, t_ns = np.array(way), np.arange(len(way)) * 500_000_000
+    scans = [seen_from(ROOM, p) for p in way]
+    before = matched(scans, odometry)
+    scans[3] = seen_from(ROOM, (*way[3][:2], way[3][2] + 0.1))
+    is_same = np.arange(len(way)) != 3
+    known = Known(before, is_same)
+
+    again = scan_matched(scans, odometry, t_ns, np.zeros(len(way), dtype=bool), known)
+    anew = matched(scans, odometry)
+
+    assert np.flatnonzero(~known.still_holds()).tolist() == list(range(3, 4 + MEMORY))
+    np.testing.assert_allclose(again.xyyaw[:3], before.xyyaw[:3], atol=1e-12)
+    assert np.abs(again.xyyaw[3] - before.xyyaw[3])[2] > 0.05
+    np.testing.assert_allclose(again.xyyaw, anew.xyyaw, atol=2e-3)
+    scale = np.abs(anew.information).max()
+    np.testing.assert_allclose(again.information, anew.information, atol=0.1 * scale)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slamreplay.geometry import se2
+from slamreplay.geometry.covariance import turned
 from slamreplay.hindsight.weighing import weighed
 from slamreplay.matching.correlative import Match, Window, match, search_window
 from slamreplay.matching.field import WORKING_RESOLUTION_M, ScoreField, points_field
@@ -52,11 +53,28 @@ class Chain:
     information: se2.Array
 
 
+@dataclass(frozen=True, eq=False)
+class Known:
+    """A chain of the same keyframes, and (K,) whether each one's points are still the same."""
+
+    chain: Chain
+    is_same: NDArray[np.bool_]
+
+    def still_holds(self) -> NDArray[np.bool_]:
+        """(K,) keyframes whose points and local map are those that they were matched with."""
+        changed = np.flatnonzero(~self.is_same)
+        out = np.ones(len(self.is_same), dtype=bool)
+        for k in changed.tolist():
+            out[k : k + MEMORY + 1] = False
+        return out
+
+
 def scan_matched(
     points: Sequence[se2.Array],
     odometry: se2.Array | None,
     t_ns: NDArray[np.int64],
     is_unknown: NDArray[np.bool_],
+    known: Known | None = None,
 ) -> Chain:
     """Match each scan against a local map of the scans before it.
 
@@ -67,16 +85,23 @@ def scan_matched(
         t_ns: (K,) their times, ascending.
         is_unknown: (K,) nothing tells the motion from the scan before: a break, not to be matched
             over, for where walls look alike a match would be found in the wrong one.
+        known: from the same odometry; matches that still hold are taken from it.
     """
     n = len(points)
     xyyaw, score = np.zeros((n, 3)), np.ones(n)
     is_break, information = np.zeros(n, dtype=bool), np.zeros((n, 3, 3))
+    holds = np.zeros(n, dtype=bool) if known is None else known.still_holds()
     memory: list[tuple[int, se2.Array]] = []  # keyframes and their points where they were laid
     room = np.empty(_ROOM, dtype=np.float32)
     for k in range(n):
         scan = thin(points[k], 0.1)
         if k and is_unknown[k]:
             xyyaw[k], score[k], is_break[k] = xyyaw[k - 1], 0.0, True
+        elif k and known is not None and holds[k]:
+            old = known.chain
+            xyyaw[k] = se2.compose(xyyaw[k - 1], se2.between(old.xyyaw[k - 1], old.xyyaw[k]))
+            score[k], is_break[k] = old.score[k], old.is_break[k]
+            information[k] = turned(old.information[k], xyyaw[k, 2] - old.xyyaw[k, 2])
         elif k and memory:
             last = xyyaw[k - 1]
             if odometry is not None:

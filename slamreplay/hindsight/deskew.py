@@ -8,6 +8,7 @@ of the sweep, 0.15 m further on.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,12 +16,35 @@ from numpy.typing import NDArray
 from slamreplay.bundle.scans import ScanSet
 from slamreplay.bundle.track import PoseTrack
 from slamreplay.geometry import se2
+from slamreplay.geometry.times import ns
+from slamreplay.hindsight.beams import Beams
 from slamreplay.hindsight.chain import Chain
 from slamreplay.hindsight.way import between_keyframes
 
 #: Odometry that misses less than this during one sweep is left alone: it is smoother than the
 #: motion between two matched scans.
 SMEAR_M, SMEAR_RAD = 0.03, 0.01
+
+
+@dataclass(frozen=True, eq=False)
+class Matched:
+    """Motion where odometry missed some of it.
+
+    Attributes:
+        motion: odometry, but as the scans have it over the links that it missed.
+        spans_ns: (S, 2) when sweeps began that it would have smeared, both ends included.
+    """
+
+    motion: PoseTrack
+    spans_ns: NDArray[np.int64]
+
+    def mended(self, told: Beams, matched: Beams) -> Beams:
+        """Scans as odometry lays them out, but as matched where it would smear them."""
+        ends = told.ends.copy()
+        for first_ns, last_ns in self.spans_ns:
+            rows = (told.t_ns >= first_ns) & (told.t_ns <= last_ns)
+            ends[rows] = matched.ends[rows]
+        return Beams(told.t_ns, ends, told.kind, told.laser_xy)
 
 
 def motion_as_matched(
@@ -30,7 +54,7 @@ def motion_as_matched(
     keys: NDArray[np.int64],
     chain: Chain,
     sweep_s: float,
-) -> PoseTrack | None:
+) -> Matched | None:
     """Odometry, but as the scans have it over links on which it would smear a sweep.
 
     Args:
@@ -60,7 +84,9 @@ def motion_as_matched(
     for k, step in enumerate(np.where(smeared[:, None], seen, told)):
         anchors[k + 1] = se2.compose(anchors[k], step)
     poses = between_keyframes(t_ns, odometry, keys, anchors).xyyaw
-    return PoseTrack.without_covariance("odom", base, t_ns, poses)
+    links = np.flatnonzero(smeared)
+    spans = np.column_stack([t_ns[keys[links]] - ns(sweep_s), t_ns[keys[links + 1]]])
+    return Matched(PoseTrack.without_covariance("odom", base, t_ns, poses), spans)
 
 
 def longest_sweep_s(lasers: Sequence[ScanSet]) -> float:

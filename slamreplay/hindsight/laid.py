@@ -12,7 +12,7 @@ from slamreplay.bundle.scans import ScanSet
 from slamreplay.bundle.track import PoseTrack
 from slamreplay.geometry import se2
 from slamreplay.hindsight.beams import Beams, beams_of, side_by_side
-from slamreplay.hindsight.chain import Chain, scan_matched, torn_links
+from slamreplay.hindsight.chain import Chain, Known, scan_matched, torn_links
 from slamreplay.hindsight.deskew import longest_sweep_s, motion_as_matched
 from slamreplay.hindsight.keyframes import keyframes, with_more
 
@@ -70,9 +70,11 @@ def laid_out(base: str, lasers: Sequence[ScanSet], matching: Callable[[], None])
         points, chain = _chained(beams, odometry, keys, is_unknown)
     matched = motion_as_matched(base, beams.t_ns, odometry, keys, chain, longest_sweep_s(lasers))
     if matched is not None:
-        motion, each = matched, [beams_of(laser, matched) for laser in lasers]
-        beams = _beside(each, motion)
-        points, chain = _chained(beams, odometry, keys, is_unknown)
+        motion, told = matched.motion, each
+        again = [beams_of(laser, motion) for laser in lasers]
+        beams = matched.mended(beams, _beside(again, motion))
+        each = [matched.mended(old, new) for old, new in zip(told, again, strict=True)]
+        points, chain = _chained(beams, odometry, keys, is_unknown, (points, chain))
     return Laid(motion, each, beams, odometry, keys, points, chain, is_told)
 
 
@@ -105,13 +107,24 @@ def motion_by_scans(base: str, beams: Beams) -> tuple[PoseTrack, NDArray[np.bool
 
 
 def _chained(
-    beams: Beams, odometry: se2.Array, keys: NDArray[np.int64], is_unknown: NDArray[np.bool_]
+    beams: Beams,
+    odometry: se2.Array,
+    keys: NDArray[np.int64],
+    is_unknown: NDArray[np.bool_],
+    before: tuple[list[se2.Array], Chain] | None = None,
 ) -> tuple[list[se2.Array], Chain]:
-    """Points of the keyframes, and how their scans lie to each other."""
+    """Points of the keyframes, and how their scans lie to each other.
+
+    What is known of the same keyframes from `before` still holds where their points are the same.
+    """
     points = [beams.points(k) for k in keys]
     parts = np.cumsum(is_unknown)[keys]
     over_unknown = np.append(False, parts[1:] > parts[:-1])
-    return points, scan_matched(points, odometry[keys], beams.t_ns[keys], over_unknown)
+    known = None
+    if before is not None:
+        same = [np.array_equal(a, b) for a, b in zip(points, before[0], strict=True)]
+        known = Known(before[1], np.array(same))
+    return points, scan_matched(points, odometry[keys], beams.t_ns[keys], over_unknown, known)
 
 
 def _beside(each: list[Beams], motion: PoseTrack | None) -> Beams:
