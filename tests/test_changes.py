@@ -206,6 +206,17 @@ def test_rack_elsewhere_is_one_region_that_moved():
     assert 0.5 < region.confidence <= 1.0
 
 
+def test_racks_side_by_side_that_are_gone_are_two_regions():
+    mapped = put(without_rack(), (3.0, 7.0), (4.4, 7.5))
+    mapped = put(mapped, (4.6, 7.0), (6.0, 7.5))
+    mapped[148, 91] = 100  # a speck of the map's between them is no region of its own
+    found = find([(0, 20, without_rack())], cells=mapped)
+
+    assert [r.kind for r in found.regions] == ["removed", "removed"]
+    wide = [r.bbox_m[2] - r.bbox_m[0] for r in found.regions]
+    assert max(wide) < 2.0
+
+
 def test_box_unlike_the_rack_that_is_gone_did_not_move():
     found = find([(0, 20, put(without_rack(), (7.5, 2.0), (8.3, 2.8)))])
 
