@@ -15,7 +15,7 @@ from slamreplay.bench.incidents import KINDS
 from slamreplay.bench.measure import Measured, measured
 from slamreplay.bench.rates import auc, best_f1, f1, share
 from slamreplay.bench.schedule import DEFAULT_LOGS, HELD_FROM, Case, schedule
-from slamreplay.bench.scores import calibration, scores
+from slamreplay.bench.scores import calibration, named, scores
 from slamreplay.bench.store import read_measured, write_measured
 from slamreplay.bench.table import page
 from slamreplay.errors import OutputError, UsageError
@@ -148,6 +148,14 @@ def test_wrongly_judged_log_gets_its_report(tmp_path, monkeypatch):
     )
 
     assert wrote == [(Case("push", 1), tmp_path / "failures")]
+    assert "| push | none 2 |" in (tmp_path / "results.md").read_text(encoding="utf-8")
+
+
+def test_failure_modes_are_counted_most_frequent_first():
+    drift, slip = made_up(), made_up()
+    slip.facts["failure_mode"] = "odometry_slip"
+
+    assert list(named([drift, slip, slip]).items()) == [("odometry_slip", 2), ("none", 1)]
 
 
 def test_baselines_are_scored_beside():

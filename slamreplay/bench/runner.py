@@ -18,7 +18,7 @@ from slamreplay.bench.failures import write_case
 from slamreplay.bench.incidents import KINDS
 from slamreplay.bench.measure import Measured, measured
 from slamreplay.bench.schedule import Case, Split, schedule
-from slamreplay.bench.scores import is_right, scores
+from slamreplay.bench.scores import is_right, named, scores
 from slamreplay.bench.store import fingerprint, read_measured, write_measured
 from slamreplay.bench.table import page
 from slamreplay.bundle.atomic import check_target, write_file
@@ -29,6 +29,8 @@ from slamreplay.verdict.reliability import Bin, Reliability
 
 RESULTS, PAGE, LOGS, FAILURES = "results.json", "results.md", "logs", "failures"
 RELIABILITY, DIAGRAM = "reliability.json", "reliability.svg"
+#: Kinds that are a hard condition by themselves.
+_HARD_KINDS = ("half_changed",)
 
 
 def run_benchmark(
@@ -93,9 +95,17 @@ def results_of(found: Sequence[Measured], seed: int, split: Split) -> dict[str, 
         "split": split,
         "scores": scores(found),
         "kinds": {k: scores([m for m in plain if m.case.kind == k]) for k in kinds},
-        "conditions": {c: scores([m for m in found if c in m.case.conditions]) for c in hard},
+        "conditions": {
+            **{c: scores([m for m in found if c in m.case.conditions]) for c in hard},
+            **{k: scores(half) for k in _HARD_KINDS if (half := _of_kind(found, k))},
+        },
+        "failure_modes": {k: named(_of_kind(found, k)) for k in KINDS if _of_kind(found, k)},
         "cases": [_told(m) for m in found],
     }
+
+
+def _of_kind(found: Sequence[Measured], kind: str) -> list[Measured]:
+    return [m for m in found if m.case.kind == kind]
 
 
 def _write_reliability(target: Path, results: dict[str, Any]) -> None:

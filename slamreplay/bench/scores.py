@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from typing import Any
@@ -54,6 +55,12 @@ def scores(logs: Sequence[Measured]) -> dict[str, Any]:
 def is_right(one: Measured) -> bool:
     """Whether the state of the log is the true one."""
     return bool(one.facts.get("judged") == one.facts.get("state") and "error" not in one.facts)
+
+
+def named(logs: Sequence[Measured]) -> dict[str, int]:
+    """How often each failure mode was named, the most frequent first."""
+    counts = Counter(str(m.facts.get("failure_mode")) for m in logs)
+    return dict(sorted(counts.items(), key=lambda item: (-item[1], item[0])))
 
 
 def _log_accuracy(logs: Sequence[Measured]) -> Rate:

@@ -85,6 +85,13 @@ def page(results: Mapping[str, Any]) -> str:
             for name, part in parts.items()
         ]
         lines += ["", f"## {title}", "", *_table(head, rows)]
+    lines += ["", "## Failure modes named", ""]
+    modes = results["failure_modes"]
+    lines += _table(
+        ("kind", "what it began with, in logs"),
+        [(k, ", ".join(f"{m.replace('_', ' ')} {n}" for m, n in v.items()))
+         for k, v in modes.items()],
+    )  # fmt: skip
     lines += ["", "## Reliability", ""]
     head = ("confidence from", "moments", "logs", "said", "right")
     lines += _table(
