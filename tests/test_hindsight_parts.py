@@ -5,9 +5,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from slamreplay.bundle.scans import ScanSet
 from slamreplay.bundle.track import PoseTrack
 from slamreplay.geometry import se2
-from slamreplay.hindsight.beams import HIT, INVALID, MISS, Beams, interleaved, side_by_side
+from slamreplay.hindsight.beams import (
+    HIT,
+    INVALID,
+    MISS,
+    Beams,
+    beams_of,
+    interleaved,
+    side_by_side,
+)
 from slamreplay.hindsight.chain import Chain
 from slamreplay.hindsight.changes import find_changes
 from slamreplay.hindsight.keyframes import keyframes, with_more
@@ -276,3 +285,31 @@ def test_interleaved_rays_start_at_their_own_laser():
     np.testing.assert_allclose(start, [5.0, 1.1 - 0.2], atol=1e-6)
     np.testing.assert_allclose(ends, [[5.0, -0.9], [4.0, -0.9]], atol=1e-6)
     assert both.kind[1].tolist() == [HIT, HIT, INVALID]
+
+
+def test_beams_end_where_their_plain_twin_has_them_in_a_sweep_that_turns():
+    rng = np.random.Generator(np.random.PCG64(2))
+    n, width = 6, 40
+    t_ns = np.arange(n) * 100_000_000
+    track_ns = np.arange(0, 700_000_001, 10_000_000)
+    steady = np.outer(track_ns / 1e9, [0.8, -0.2, 1.1])
+    ranges = rng.uniform(0.5, 9.0, (n, width)).astype(np.float32)
+    hits = rng.random((n, width)) < 0.8
+    scans = ScanSet(
+        t_ns,
+        ranges,
+        np.full(n, -1.5),
+        np.full(n, 0.07),
+        np.full(n, 0.1 / width),
+        hits,
+        np.zeros((n, width), dtype=bool),
+        np.full(n, 10.0),
+        np.array([0.2, 0.1, 0.3]),
+        PoseTrack.without_covariance("odom", "base", track_ns, steady),
+    )
+    beams = beams_of(scans, scans.odometry)
+
+    for k in range(n):
+        np.testing.assert_allclose(beams.points(k), scans.points(k), atol=5e-3)
+    still = beams_of(scans, None)
+    assert np.abs(still.points(0) - beams.points(0)).max() > 0.1

@@ -5,11 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from slamreplay.bundle.scans import ScanSet
 from slamreplay.bundle.track import PoseTrack
 from slamreplay.geometry import se2
+from slamreplay.matching.threads import share_out
 
 INVALID, HIT, MISS = 0, 1, 2
 #: A beam without a return proves free space no farther than this, whatever the driver claims.
@@ -18,6 +20,8 @@ MAX_REACH_M = 30.0
 MIN_RANGE_M = 0.15
 #: Scans of two lasers further apart than this are not laid side by side.
 PAIRED_NS = 150_000_000
+#: So many scans are worth a thread of their own.
+_WORTH_A_THREAD = 200
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,22 +60,43 @@ def beams_of(scans: ScanSet, motion: PoseTrack | None) -> Beams:
     kind = np.where(scans.hits, HIT, np.where(scans.misses, MISS, INVALID)).astype(np.int8)
     limit = np.minimum(np.nan_to_num(scans.range_max_m, nan=0.0), MAX_REACH_M)
     reach = np.where(kind == MISS, limit[:, None], scans.ranges_m).astype(np.float32)
-    beam = np.arange(width)
-    bearing = scans.angle_min[:, None] + beam * scans.angle_increment[:, None]
-    kind[~(reach >= MIN_RANGE_M) | ~np.isfinite(bearing)] = INVALID
-    reach[kind == INVALID], bearing[kind == INVALID] = 0.0, 0.0
+    kind[~(reach >= MIN_RANGE_M)] = INVALID
+    kind[~np.isfinite(scans.angle_min + scans.angle_increment)] = INVALID
     mount = scans.xyyaw_base_laser
-    ends = np.empty((n, width, 2), dtype=np.float32)
-    ends[..., 0] = mount[0] + reach * np.cos(bearing + mount[2])
-    ends[..., 1] = mount[1] + reach * np.sin(bearing + mount[2])
+    ends = np.zeros((n, width, 2), dtype=np.float32)
+    during = np.zeros((n, 3))
     sweep_s = scans.time_increment_s * (width - 1)
     if motion is not None and width > 1 and (sweep_s > 0.0).any():
         late_ns = np.where(sweep_s > 0.0, sweep_s * 1e9, 0.0).astype(np.int64)
         during = se2.between(motion.at(scans.t_ns).xyyaw, motion.at(scans.t_ns + late_ns).xyyaw)
         during = np.where(np.isfinite(during), during, 0.0)  # beyond the track: left as it is
-        part = during[:, None, :] * (beam / (width - 1))[:, None]
-        _move(ends, part)
+    every_scan = (reach, kind, scans.angle_min, scans.angle_increment, during, ends)
+
+    def work(first: int, stop: int) -> None:
+        _lay_out(mount, *(values[first:stop] for values in every_scan))
+
+    share_out(n, work, _WORTH_A_THREAD)
     return Beams(scans.t_ns, ends, kind, mount[:2].copy())
+
+
+@njit(cache=True, nogil=True)
+def _lay_out(mount, reach, kind, angle_min, angle_increment, during, ends):  # type: ignore[no-untyped-def]
+    """Ends of the valid beams about the base at the stamp, each after its part of the motion."""
+    count, width = reach.shape
+    for s in range(count):
+        for b in range(width):
+            if kind[s, b] == INVALID:
+                continue
+            bearing = mount[2] + angle_min[s] + b * angle_increment[s]
+            x = mount[0] + reach[s, b] * np.cos(bearing)
+            y = mount[1] + reach[s, b] * np.sin(bearing)
+            if during[s, 0] != 0.0 or during[s, 1] != 0.0 or during[s, 2] != 0.0:
+                part = b / (width - 1)
+                cos, sin = np.cos(part * during[s, 2]), np.sin(part * during[s, 2])
+                x, y = cos * x - sin * y, sin * x + cos * y
+                x += part * during[s, 0]
+                y += part * during[s, 1]
+            ends[s, b, 0], ends[s, b, 1] = x, y
 
 
 def side_by_side(first: Beams, second: Beams, motion: PoseTrack | None) -> Beams:
