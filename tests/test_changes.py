@@ -17,13 +17,14 @@ from slamreplay.bundle.freshness import NEVER, Freshness, fresh_enough
 from slamreplay.bundle.store import write_bundle
 from slamreplay.cli import report
 from slamreplay.errors import OutputError
+from slamreplay.geometry import se2
 from slamreplay.hindsight.beams import HIT, MISS, Beams
-from slamreplay.hindsight.changed_beams import on_map
+from slamreplay.hindsight.changed_beams import NEARER, SILENT, BeamsOnMap, on_map
 from slamreplay.hindsight.changes import find_changes
-from slamreplay.hindsight.evidence import bins_of_each, lattice, marks, passes
+from slamreplay.hindsight.evidence import bins_of_each, end_cells, lattice, marks, passes
 from slamreplay.hindsight.occupancy import taken
 from slamreplay.hindsight.regions import confidence
-from slamreplay.hindsight.standing import nearest_empty
+from slamreplay.hindsight.standing import nearest_empty, standing
 from slamreplay.maps.grid import OccupancyGrid
 from slamreplay.maps.map_server import map_files, read_map
 from slamreplay.maps.raycast import cast_rays
@@ -417,6 +418,39 @@ def test_threads_change_nothing(monkeypatch):
     assert (passed.bin_count == passed.through.sum(axis=1).reshape(where.shape)).all()
     assert found[1] == found[0]
     assert found[2] == found[0]
+
+
+def test_place_is_not_empty_where_beams_end_that_came_over_unmapped_cells():
+    where = lattice(working_map(hall()), np.arange(60) * S // 2)
+    cell = 40 * where.shape[1] + 40
+    says = np.full((60, 1), NEARER, dtype=np.int8)
+    says[:20] = SILENT  # unmapped cells lay before it
+    at = np.full((60, 1), 80 * where.width + 80, dtype=np.int32)
+    laid = BeamsOnMap(says, at, np.zeros((60, 1), dtype=bool), np.zeros((60, 1), dtype=np.float32))
+    slots = np.full(where.shape, -1, dtype=np.int32)
+    slots.ravel()[cell] = 0
+    through = np.ones((1, where.bin_count), dtype=bool)  # along its face
+
+    ended = (np.full(60, cell), where.bins)
+    nowhere = (np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int32))
+
+    assert not standing(where, laid, slots, through, ended).empty.any()
+    assert standing(where, laid, slots, through, nowhere).empty.ravel().tolist() == (
+        [True] * 19 + [False] * 41
+    )
+
+
+def test_cells_of_ends_equal_their_plain_twin():
+    beams, poses = turning_beams(40)
+    where = lattice(working_map(hall()), beams.t_ns)
+    ends = se2.transform_points(poses, beams.ends)[beams.kind == HIT]
+    with np.errstate(invalid="ignore"):
+        col, row = np.floor((ends - where.corner_xy) / where.cell_m).T
+        inside = (row >= 0) & (row < where.shape[0]) & (col >= 0) & (col < where.shape[1])
+    plain = np.where(inside, row * where.shape[1] + col, -1)
+
+    np.testing.assert_array_equal(end_cells(where, beams, poses), plain)
+    assert 0.2 < np.mean(plain < 0) < 0.8
 
 
 def test_marks_and_counts_of_bins_equal_their_plain_twins():

@@ -14,7 +14,7 @@ from slamreplay.hindsight.beams import HIT, INVALID, MISS, Beams
 from slamreplay.hindsight.changed_beams import BEYOND, BEYOND_M, NEARER, SILENT, BeamsOnMap, on_map
 from slamreplay.hindsight.correction import Edits, corrected, last_state
 from slamreplay.hindsight.emptied import empty_since, went_with_it
-from slamreplay.hindsight.evidence import Lattice, lattice, passes
+from slamreplay.hindsight.evidence import Lattice, end_cells, lattice, passes
 from slamreplay.hindsight.freshness import freshness_of
 from slamreplay.hindsight.gone import gone
 from slamreplay.hindsight.reach import is_lossy, proven_reach_m
@@ -60,9 +60,11 @@ def _look(
         reach_m = 0.0
     slots, count = asked_cells(where, laid)
     passed = passes(where, beams, poses, reach_m, slots, count)
-    new = standing(where, laid, slots, passed.through)
-    ends = _ends(where, beams, poses)
-    away = gone(where, beams, laid, ends)
+    ends = end_cells(where, beams, poses)
+    bins = np.broadcast_to(where.bins[:, None], beams.kind.shape)[beams.kind == HIT]
+    ended = (ends[ends >= 0], bins[ends >= 0])
+    new = standing(where, laid, slots, passed.through, ended)
+    away = gone(where, laid, ended)
     is_new = _at(where, laid, NEARER, new.slots, new.holds)
     is_gone = _at(where, laid, BEYOND, away.slots, away.holds)
 
@@ -72,7 +74,7 @@ def _look(
     removed_share = np.count_nonzero(is_gone, axis=1) / valid
     appeared = _mask(working, laid.where[is_new])
     removed = _mask(working, laid.where[is_gone])
-    empty = where.fine(empty_since(where, beams, ends, passed), working.walls.shape)
+    empty = where.fine(empty_since(where, ended, passed), working.walls.shape)
     with_it = went_with_it(working, removed, empty)
     first, removed = removed, removed | (with_it & working.walls)
     new_clear = _clear(working, where, new.slots, new.seen_s, new.through_s)
@@ -105,23 +107,6 @@ def _near_a_wall(working: WorkingMap, laid: BeamsOnMap) -> NDArray[np.bool_]:
     """(N, B) beams that end before their wall, but so near to another one that it explains them."""
     apart_m = distance_transform_edt(~working.walls) * working.resolution_m
     return (laid.says == NEARER) & (apart_m.ravel()[laid.where] <= BEYOND_M)
-
-
-def _ends(where: Lattice, beams: Beams, poses: se2.Array) -> NDArray[np.int64]:
-    """(K,) flat evidence cell of the end of each hit, -1 outside the map or without a pose."""
-    hit = beams.kind == HIT
-    pose = np.broadcast_to(poses[:, None, :], (*hit.shape, 3))[hit]
-    ends = beams.ends[hit].astype(np.float64)
-    cos, sin = np.cos(pose[:, 2]), np.sin(pose[:, 2])
-    x = pose[:, 0] + cos * ends[:, 0] - sin * ends[:, 1]
-    y = pose[:, 1] + sin * ends[:, 0] + cos * ends[:, 1]
-    height, width = where.shape
-    with np.errstate(invalid="ignore"):
-        col = np.floor((x - where.corner_xy[0]) / where.cell_m)
-        row = np.floor((y - where.corner_xy[1]) / where.cell_m)
-        inside = (row >= 0) & (row < height) & (col >= 0) & (col < width)
-        flat = np.where(inside, row * width + col, -1.0)
-    return flat.astype(np.int64)
 
 
 def _at(

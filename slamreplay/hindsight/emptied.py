@@ -6,7 +6,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import binary_propagation, maximum_filter
 
-from slamreplay.hindsight.beams import HIT, Beams
 from slamreplay.hindsight.changed_beams import BEYOND_M
 from slamreplay.hindsight.evidence import BIN_S, Lattice, Passes
 from slamreplay.hindsight.gone import GONE_S
@@ -14,13 +13,11 @@ from slamreplay.matching.field import WorkingMap
 
 
 def empty_since(
-    where: Lattice, beams: Beams, ends: NDArray[np.int64], passed: Passes
+    where: Lattice, ends: tuple[NDArray[np.int64], NDArray[np.int32]], passed: Passes
 ) -> NDArray[np.bool_]:
     """(H, W) evidence cells that beams went through, and near which nothing was seen after that."""
     seen = np.full(where.shape, -where.bin_count, dtype=np.int32)
-    at = ends >= 0
-    bins = np.broadcast_to(where.bins[:, None], beams.kind.shape)[beams.kind == HIT][at]
-    np.maximum.at(seen.ravel(), ends[at], bins)
+    np.maximum.at(seen.ravel(), *ends)
     near = maximum_filter(seen, 2 * round(BEYOND_M / where.cell_m) + 1)
     went = np.where(passed.last >= 0, where.bins[np.maximum(passed.last, 0)], -1)
     long_enough = round(GONE_S / BIN_S)

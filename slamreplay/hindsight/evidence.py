@@ -9,7 +9,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from slamreplay.geometry import se2
-from slamreplay.hindsight.beams import INVALID, MISS, Beams
+from slamreplay.hindsight.beams import HIT, INVALID, MISS, Beams
 from slamreplay.matching.field import WorkingMap
 from slamreplay.matching.threads import share_out
 
@@ -63,6 +63,29 @@ def lattice(working: WorkingMap, t_ns: NDArray[np.int64]) -> Lattice:
     bins = ((t_ns - t_ns[0]) // round(BIN_S * 1e9)).astype(np.int32)
     cell_m = step * working.resolution_m
     return Lattice((rows, cols), step, working.walls.shape[1], cell_m, working.corner_xy, bins)
+
+
+def end_cells(where: Lattice, beams: Beams, poses: se2.Array) -> NDArray[np.int64]:
+    """(K,) flat evidence cell of the end of each hit, -1 outside the map or without a pose."""
+    cells = np.empty(np.count_nonzero(beams.kind == HIT), dtype=np.int64)
+    _end_cells(beams.ends, beams.kind, poses, where.corner_xy, where.cell_m, where.shape, cells)
+    return cells
+
+
+@njit(cache=True)
+def _end_cells(ends, kind, poses, corner, cell_m, shape, out):  # type: ignore[no-untyped-def]
+    k = 0
+    for s in range(kind.shape[0]):
+        cos, sin = np.cos(poses[s, 2]), np.sin(poses[s, 2])
+        for b in range(kind.shape[1]):
+            if kind[s, b] != HIT:
+                continue
+            x = poses[s, 0] + cos * ends[s, b, 0] - sin * ends[s, b, 1]
+            y = poses[s, 1] + sin * ends[s, b, 0] + cos * ends[s, b, 1]
+            col, row = np.floor((x - corner[0]) / cell_m), np.floor((y - corner[1]) / cell_m)
+            inside = 0 <= row < shape[0] and 0 <= col < shape[1]  # not of a pose that is NaN
+            out[k] = int(row) * shape[1] + int(col) if inside else -1
+            k += 1
 
 
 def marks(

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from slamreplay.hindsight.beams import HIT, Beams
 from slamreplay.hindsight.changed_beams import BEYOND, BEYOND_M, BeamsOnMap
 from slamreplay.hindsight.evidence import BIN_S, Lattice, marks
 from slamreplay.hindsight.occupancy import taken
@@ -37,15 +36,15 @@ class Gone:
     seen_s: NDArray[np.float64]
 
 
-def gone(where: Lattice, beams: Beams, on_map: BeamsOnMap, ends: NDArray[np.int64]) -> Gone:
+def gone(
+    where: Lattice, on_map: BeamsOnMap, ends: tuple[NDArray[np.int64], NDArray[np.int32]]
+) -> Gone:
     """The mapped walls that beams went through, and when they were gone.
 
     Args:
         where: the lattice.
-        beams: the scans.
         on_map: the beams against the map.
-        ends: (K,) flat cells in which the beams that hit something ended, in the order of
-            `np.nonzero(beams.kind == HIT)`, -1 outside the map.
+        ends: (K,) flat cells and bins in which beams ended.
     """
     scan, beam = np.nonzero(on_map.says == BEYOND)
     cells = where.cells_of(on_map.where[scan, beam])
@@ -54,10 +53,8 @@ def gone(where: Lattice, beams: Beams, on_map: BeamsOnMap, ends: NDArray[np.int6
     asked = np.unique(cells)
     slots.ravel()[asked] = np.arange(len(asked), dtype=np.int32)
     passed = marks(where, cells[sure], where.bins[scan[sure]], slots, 0, len(asked))
-    at = ends >= 0
-    bins = np.broadcast_to(where.bins[:, None], beams.kind.shape)[beams.kind == HIT][at]
     radius = round(BEYOND_M / where.cell_m)
-    seen = marks(where, ends[at], bins, slots, radius, len(asked))
+    seen = marks(where, *ends, slots, radius, len(asked))
     is_gone = ~taken(seen, passed)
     alone = passed & ~seen
     enough = np.count_nonzero(alone & is_gone, axis=1) * BIN_S >= GONE_S

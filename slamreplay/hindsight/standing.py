@@ -77,6 +77,7 @@ def standing(
     on_map: BeamsOnMap,
     slots: NDArray[np.int32],
     through: NDArray[np.bool_],
+    ends: tuple[NDArray[np.int64], NDArray[np.int32]],
 ) -> Standing:
     """What of the new things stood, and when.
 
@@ -85,16 +86,18 @@ def standing(
         on_map: the beams against the map.
         slots: (H, W) of `asked_cells`.
         through: (C, T) when those cells were seen through.
+        ends: (K,) cells and bins in which any beam ended, whatever it says of the map.
     """
     scan, beam = np.nonzero(on_map.says == NEARER)
     cells = where.cells_of(on_map.where[scan, beam])
     count = len(through)
     seen = marks(where, cells, where.bins[scan], slots, 1, count)
     # Beams pass the corners of what stands: only where nothing is seen about the same time is the
-    # cell empty.
-    about = seen.copy()
-    about[:, 1:] |= seen[:, :-1]
-    about[:, :-1] |= seen[:, 1:]
+    # cell empty. Beams that came over unmapped cells say nothing of the map, but they ended there.
+    met = seen | marks(where, *ends, slots, 1, count)
+    about = met.copy()
+    about[:, 1:] |= met[:, :-1]
+    about[:, :-1] |= met[:, 1:]
     empty = through & ~about
     state = taken(seen, empty)
     runs = _longest_runs(state, seen)
