@@ -195,27 +195,28 @@ def test_what_stands_on_unmapped_ground_is_unchanged():
 
 
 KNOWN = np.zeros(10, dtype=bool)
+HELD = ~KNOWN
 
 
 def test_carried_robot_gets_keyframes_although_its_wheels_stand():
     near, far = hall().cells, with_box((20, 20), (120, 75))
     beams = beams_in([near] * 5 + [far] * 5)
 
-    assert keyframes(beams, np.zeros((10, 3)), KNOWN).tolist() == [0, 5]
+    assert keyframes(beams, np.zeros((10, 3)), KNOWN, HELD).tolist() == [0, 5]
 
 
 def test_motion_makes_keyframes():
     beams = beams_in([hall().cells] * 10)
     odometry = np.column_stack([np.arange(10) * 0.1, np.zeros(10), np.zeros(10)])
 
-    assert keyframes(beams, odometry, KNOWN).tolist() == [0, 3, 6, 9]
-    assert keyframes(beams, odometry * 0.0, KNOWN).tolist() == [0]
+    assert keyframes(beams, odometry, KNOWN, HELD).tolist() == [0, 3, 6, 9]
+    assert keyframes(beams, odometry * 0.0, KNOWN, HELD).tolist() == [0]
 
 
 def test_unknown_motion_has_a_keyframe_on_either_side():
     beams = beams_in([hall().cells] * 10)
 
-    assert keyframes(beams, np.zeros((10, 3)), np.arange(10) == 6).tolist() == [0, 5, 6]
+    assert keyframes(beams, np.zeros((10, 3)), np.arange(10) == 6, HELD).tolist() == [0, 5, 6]
 
 
 def test_link_that_odometry_missed_gets_more_keyframes():
@@ -230,10 +231,35 @@ def test_without_odometry_a_gap_in_the_scans_is_a_break():
     beams = beams_in([hall().cells] * 6)
     beams = replace(beams, t_ns=np.array([0, 1, 2, 40, 41, 42]) * 100_000_000)
 
-    track, is_unknown = motion_by_scans("base", beams)
+    track, is_unknown, is_held = motion_by_scans("base", beams)
 
     assert is_unknown.tolist() == [False, False, False, True, False, False]
+    assert is_held.all()
     assert np.abs(track.xyyaw).max() < 0.02
+
+
+@pytest.mark.parametrize("is_bare", [True, False])
+def test_without_odometry_scans_between_bare_walls_are_not_held(is_bare):
+    """A robot drives along x, 1 m/s, between two walls that its laser sees no end of."""
+    cells = np.zeros((80, 800), dtype=np.int8)
+    cells[[20, 60]] = 100
+    if not is_bare:  # cupboards
+        for col in range(0, 800, 60):
+            cells[20:34, col : col + 14] = 100
+    walls = OccupancyGrid(cells, 0.05, np.zeros(3))
+    at = np.column_stack([np.arange(15.0, 19.0, 0.1), np.full(40, 2.1), np.zeros(40)])
+    bearings = np.radians(np.arange(0.0, 360.0, 2.0))
+    rng = np.random.Generator(np.random.PCG64(4))
+    reach = cast_rays(walls, at, bearings, 8.0)
+    kind = np.where(np.isfinite(reach), HIT, MISS).astype(np.int8)
+    reach = np.where(kind == HIT, reach, 8.0) + rng.normal(0.0, 0.01, reach.shape)
+    ends = np.stack([reach * np.cos(bearings), reach * np.sin(bearings)], axis=-1)
+    beams = Beams(np.arange(40) * 100_000_000, ends.astype(np.float32), kind, np.zeros(2))
+
+    _, is_unknown, is_held = motion_by_scans("base", beams)
+
+    assert is_held.mean() == (0.0 if is_bare else 1.0)
+    assert len(keyframes(beams, at, is_unknown, is_held)) == (0 if is_bare else 14)
 
 
 def laser(t_s: list[float], x: float, ends: list[tuple[float, float]]) -> Beams:

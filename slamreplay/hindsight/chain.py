@@ -15,7 +15,8 @@ from slamreplay.matching.correlative import Match, Window, match, search_window
 from slamreplay.matching.field import WORKING_RESOLUTION_M, ScoreField, points_field
 from slamreplay.matching.thinning import thin
 
-SIGMA_M = 0.08
+#: Width of the score around points, and how far apart those of a scan are kept.
+SIGMA_M, SPACING_M = 0.08, 0.1
 #: How many keyframes back the local map reaches, and how far around the robot.
 MEMORY, RADIUS_M = 12, 15.0
 #: Cells of a local map at the most.
@@ -94,7 +95,7 @@ def scan_matched(
     memory: list[tuple[int, se2.Array]] = []  # keyframes and their points where they were laid
     room = np.empty(_ROOM, dtype=np.float32)
     for k in range(n):
-        scan = thin(points[k], 0.1)
+        scan = thin(points[k], SPACING_M)
         if k and is_unknown[k]:
             xyyaw[k], score[k], is_break[k] = xyyaw[k - 1], 0.0, True
         elif k and known is not None and holds[k]:

@@ -19,7 +19,10 @@ MIN_POINTS = 10
 
 
 def keyframes(
-    beams: Beams, odometry: se2.Array, is_unknown: NDArray[np.bool_]
+    beams: Beams,
+    odometry: se2.Array,
+    is_unknown: NDArray[np.bool_],
+    is_held: NDArray[np.bool_],
 ) -> NDArray[np.int64]:
     """Indices of the keyframes among the scans.
 
@@ -28,9 +31,10 @@ def keyframes(
         odometry: (N, 3) pose in the odom frame at each scan.
         is_unknown: (N,) scans to which the motion from the one before is not known; a keyframe
             stands on either side, so that no scan in between is carried over.
+        is_held: (N,) scans that can be keyframes: the motion through the others is not known.
     """
     hit, reach = beams.kind == HIT, _reach(beams)
-    enough = hit.sum(axis=1) >= MIN_POINTS
+    enough = (hit.sum(axis=1) >= MIN_POINTS) & is_held
     usable = np.flatnonzero(enough)
     part = np.cumsum(is_unknown)[usable]
     at_edge = np.zeros(len(beams), dtype=bool)

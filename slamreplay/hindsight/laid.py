@@ -14,6 +14,7 @@ from slamreplay.geometry import se2
 from slamreplay.hindsight.beams import Beams, beams_of, side_by_side
 from slamreplay.hindsight.chain import Chain, Known, scan_matched, torn_links
 from slamreplay.hindsight.deskew import longest_sweep_s, motion_as_matched
+from slamreplay.hindsight.held import is_held
 from slamreplay.hindsight.keyframes import keyframes, with_more
 
 #: Without odometry nothing tells how a robot moved while it saw nothing for longer than this.
@@ -33,6 +34,7 @@ class Laid:
         points: of each keyframe (M, 2) ends of its beams in the base frame.
         chain: how the keyframes lie to each other.
         is_told: the log has odometry; nothing stands in for it.
+        is_held: (N,) scans whose motion is known in all directions: by odometry, or by the scans.
     """
 
     motion: PoseTrack
@@ -43,6 +45,7 @@ class Laid:
     points: list[se2.Array]
     chain: Chain
     is_told: bool
+    is_held: NDArray[np.bool_]
 
 
 def laid_out(base: str, lasers: Sequence[ScanSet], matching: Callable[[], None]) -> Laid:
@@ -54,18 +57,20 @@ def laid_out(base: str, lasers: Sequence[ScanSet], matching: Callable[[], None])
         matching: called before the scans are matched.
     """
     motion, is_unknown = lasers[0].odometry, np.zeros(len(lasers[0].t_ns), dtype=bool)
+    held = ~is_unknown
     is_told = motion is not None and bool(motion.has_pose.any())
     if motion is None or not is_told:
         still = _beside([beams_of(laser, None) for laser in lasers], None)
-        motion, is_unknown = motion_by_scans(base, still)
+        motion, is_unknown, held = motion_by_scans(base, still)
     each = [beams_of(laser, motion) for laser in lasers]
     beams = _beside(each, motion)
     odometry = odometry_at(motion, beams.t_ns)
-    keys = keyframes(beams, odometry, is_unknown)
+    keys = keyframes(beams, odometry, is_unknown, held)
     matching()
     points, chain = _chained(beams, odometry, keys, is_unknown)
     is_torn = torn_links(chain, odometry[keys])
-    if (more := with_more(beams, keys, is_torn)).size > keys.size:
+    more = with_more(beams, keys, is_torn)
+    if (more := more[held[more]]).size > keys.size:
         keys = more
         points, chain = _chained(beams, odometry, keys, is_unknown)
     matched = motion_as_matched(base, beams.t_ns, odometry, keys, chain, longest_sweep_s(lasers))
@@ -75,7 +80,7 @@ def laid_out(base: str, lasers: Sequence[ScanSet], matching: Callable[[], None])
         beams = matched.mended(beams, _beside(again, motion))
         each = [matched.mended(old, new) for old, new in zip(told, again, strict=True)]
         points, chain = _chained(beams, odometry, keys, is_unknown, (points, chain))
-    return Laid(motion, each, beams, odometry, keys, points, chain, is_told)
+    return Laid(motion, each, beams, odometry, keys, points, chain, is_told, held)
 
 
 def odometry_at(motion: PoseTrack, t_ns: NDArray[np.int64]) -> se2.Array:
@@ -92,18 +97,23 @@ def odometry_at(motion: PoseTrack, t_ns: NDArray[np.int64]) -> se2.Array:
     return np.asarray(poses[known[np.maximum(before, 0)]])
 
 
-def motion_by_scans(base: str, beams: Beams) -> tuple[PoseTrack, NDArray[np.bool_]]:
+def motion_by_scans(
+    base: str, beams: Beams
+) -> tuple[PoseTrack, NDArray[np.bool_], NDArray[np.bool_]]:
     """What stands in for odometry where a log has none: each scan matched to those before it.
 
     Returns:
-        The track, and for each scan (N,) whether the motion to it is not known: too long after the
-        one before, or like nothing before it.
+        The track; for each scan (N,) whether the motion to it is not known: too long after the
+        one before, like nothing before it, or the first one after scans that nothing holds; and
+        whether it is held: along bare walls nothing in a scan tells how far the robot went.
     """
     late = np.append(False, np.diff(beams.t_ns) > UNSEEN_NS)
     points = [beams.points(k) for k in range(len(beams))]
     chain = scan_matched(points, None, beams.t_ns, late)
+    held = is_held(beams, chain)
     track = PoseTrack.without_covariance("odom", base, beams.t_ns, chain.xyyaw)
-    return track, chain.is_break
+    again = np.append(False, held[1:] & ~held[:-1])
+    return track, chain.is_break | again, held
 
 
 def _chained(

@@ -128,7 +128,8 @@ def _rebuilt(
         poses, cov, is_open, trusted = back.xyyaw, back.cov, back.is_open, back.has_place
     carried, share, doubt = carry(odometry, keys, poses, is_open, beams, field)
     carried, scan_cov = settle(carried, cov[share], odometry, keys[share], doubt, beams, field)
-    carried[~trusted[share]], scan_cov[~trusted[share]] = np.nan, np.nan
+    unplaced = ~trusted[share] | ~laid.is_held
+    carried[unplaced], scan_cov[unplaced] = np.nan, np.nan
     match = scan_scores(field, beams, carried)
     if len(each) > 1 and _second_misfits(field, each, carried, motion):
         return None
@@ -146,7 +147,7 @@ def _rebuilt(
         places.margin,
         changes,
         {} if other is None else other.joined(),
-        lead[share],
+        np.where(laid.is_held, lead[share], 0.0),
     )
 
 
