@@ -36,6 +36,7 @@ def postmortem(
     *,
     limits: Limits | None = None,
     hold_out: Collection[str] = (),
+    correct_map: bool = False,
     progress: Callable[[str, float], None] | None = None,
 ) -> Postmortem:
     """Look back on one log.
@@ -49,12 +50,17 @@ def postmortem(
         limits: thresholds of the verdict; the defaults are design's.
         hold_out: kinds of sensed references (fiducial, dock, gnss) that judge hindsight instead of
             joining it.
+        correct_map: propose a corrected map, too.
         progress: told what is being done, and the share done from 0 to 1.
     """
     limits = Limits() if limits is None else limits
     say = progress or (lambda _what, _share: None)
     view = bundle.view(hold_out)
-    found = hindsight(view, progress=lambda what, share: say(what, _HINDSIGHT_SHARE * share))
+    found = hindsight(
+        view,
+        correct_map=correct_map,
+        progress=lambda what, share: say(what, _HINDSIGHT_SHARE * share),
+    )
     say("verdict", _HINDSIGHT_SHARE)
     belief = recorded_belief(view, belief_times(view))
     judgement = judge(view, belief, found, limits)

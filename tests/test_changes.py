@@ -82,7 +82,7 @@ def find(phases, poses=(POSE,), rate_hz=10.0, lost=lambda ranges: ~np.isfinite(r
     ends = np.stack([ranges * np.cos(BEARINGS), ranges * np.sin(BEARINGS)], axis=-1)
     beams = Beams(np.array(t_ns), ends.astype(np.float32), kind, np.zeros(2))
     grid = hall() if cells is None else replace(hall(), cells=cells)
-    return find_changes(grid, working_map(grid), beams, np.array(at))
+    return find_changes(grid, working_map(grid), beams, np.array(at), correct_map=True)
 
 
 def test_hall_as_mapped_has_no_changes():

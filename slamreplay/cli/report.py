@@ -114,7 +114,13 @@ def _report(
         from slamreplay.report.writer import write_report
 
         with progress_bar("looking back") as progress:
-            post = postmortem(bundle, runs, hold_out=hold_out or (), progress=progress)
+            post = postmortem(
+                bundle,
+                runs,
+                hold_out=hold_out or (),
+                correct_map=update_map is not None,
+                progress=progress,
+            )
             page = write_report(post, output)
         if update_map is not None:
             _propose(post, update_map, map_yaml)

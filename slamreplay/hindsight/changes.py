@@ -25,7 +25,12 @@ from slamreplay.matching.field import WorkingMap, working_map
 
 
 def find_changes(
-    grid: OccupancyGrid, working: WorkingMap, beams: Beams, poses: se2.Array
+    grid: OccupancyGrid,
+    working: WorkingMap,
+    beams: Beams,
+    poses: se2.Array,
+    *,
+    correct_map: bool = False,
 ) -> Changes:
     """Changed beams of every scan, and the changed cells behind them.
 
@@ -34,9 +39,12 @@ def find_changes(
         working: the same map, as it is searched.
         beams: the scans.
         poses: (N, 3) of the base in the grid's frame, NaN where there is none.
+        correct_map: propose a map, too: it is checked by looking again, which takes as long again.
     """
     poses = np.ascontiguousarray(poses)
     changes, edits = _look(grid, working, beams, poses)
+    if not correct_map:
+        return changes
 
     def look_again(now: OccupancyGrid) -> Edits | None:
         walls = working_map(now)

@@ -6,7 +6,7 @@ It reads neither the recorded belief nor an initial pose: a robot that was lost 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,11 +51,23 @@ _BOTH_KNOW = 0.5
 Progress = Callable[[str, float], None]
 
 
-def hindsight(view: BundleView, *, progress: Progress | None = None) -> Hindsight | None:
+@dataclass(frozen=True, eq=False)
+class _Drawn:
+    """The map: as it was drawn, as it is searched, and whether a corrected one is asked for."""
+
+    grid: OccupancyGrid
+    working: WorkingMap
+    correct_map: bool
+
+
+def hindsight(
+    view: BundleView, *, correct_map: bool = False, progress: Progress | None = None
+) -> Hindsight | None:
     """Where the robot really was, from scans, odometry and map alone.
 
     Args:
         view: the evidence.
+        correct_map: propose a corrected map, too.
         progress: told the step and its share done, 0 to 1.
 
     Returns:
@@ -68,23 +80,24 @@ def hindsight(view: BundleView, *, progress: Progress | None = None) -> Hindsigh
     if not lasers or grid is None or working is None:
         return None
     base = view.manifest.frames.base or "base_link"
-    whole = _rebuilt(view, base, grid, working, lasers, say)
+    drawn = _Drawn(grid, working, correct_map)
+    whole = _rebuilt(view, base, drawn, lasers, say)
     if whole is not None and (len(lasers) == 1 or whole.coverage >= _BOTH_KNOW):
         return whole
-    alone = _rebuilt(view, base, grid, working, lasers[:1], say)
+    alone = _rebuilt(view, base, drawn, lasers[:1], say)
     return alone if whole is None or (alone and alone.coverage > whole.coverage) else whole
 
 
 def _rebuilt(
     view: BundleView,
     base: str,
-    grid: OccupancyGrid,
-    working: WorkingMap,
+    drawn: _Drawn,
     lasers: Sequence[ScanSet],
     say: Progress,
 ) -> Hindsight | None:
     """Hindsight from these lasers; None where the map explains the second far worse."""
     say("keyframes", 0.0)
+    grid, working = drawn.grid, drawn.working
     laid = laid_out(base, lasers, lambda: say("scan matching", 0.05))
     motion, each, beams, odometry = laid.motion, laid.each, laid.beams, laid.odometry
     keys, points, chain = laid.keys, laid.points, laid.chain
@@ -134,7 +147,7 @@ def _rebuilt(
     if len(each) > 1 and _second_misfits(field, each, carried, motion):
         return None
     say("changes", 0.85)
-    changes = _changes(grid, working, each, carried, motion)
+    changes = _changes(drawn, each, carried, motion)
     say("changes", 1.0)
     track = _to_track(working, grid.frame_id, base, beams.t_ns, carried, scan_cov)
     sigma = np.sqrt(0.5 * (scan_cov[:, 0, 0] + scan_cov[:, 1, 1]))
@@ -167,18 +180,13 @@ def _second_misfits(
     return bool(np.nanmedian(theirs) < MISFIT * np.nanmedian(ours))
 
 
-def _changes(
-    grid: OccupancyGrid,
-    working: WorkingMap,
-    each: list[Beams],
-    poses: se2.Array,
-    motion: PoseTrack,
-) -> Changes:
+def _changes(drawn: _Drawn, each: list[Beams], poses: se2.Array, motion: PoseTrack) -> Changes:
     """Changes seen by all lasers; the shares are pooled at the first one's scans."""
+    grid, working, correct_map = drawn.grid, drawn.working, drawn.correct_map
     if len(each) == 1:
-        return find_changes(grid, working, each[0], poses)
+        return find_changes(grid, working, each[0], poses, correct_map=correct_map)
     both, both_poses, is_first = interleaved(each[0], each[1], poses, motion)
-    found = find_changes(grid, working, both, both_poses)
+    found = find_changes(grid, working, both, both_poses, correct_map=correct_map)
     return replace(
         found,
         t_ns=found.t_ns[is_first],
