@@ -5,8 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
-from slamreplay.bench import faults
 from slamreplay.bench.crowds import crowd
+from slamreplay.bench.structure import boxes_added, racks_removed
 from slamreplay.bundle.view import Bundle
 from slamreplay.ingest.options import IngestOptions
 from slamreplay.ingest.pipeline import ingest
@@ -27,7 +27,7 @@ M_PER_S = 0.55
 
 
 def long_log(log: Path, size_m: float, seconds: float, seed: int) -> Path:
-    """Write a log of at least that many seconds in a square hall, two racks of which have moved."""
+    """Write a log of that many seconds and more in a hall with racks gone and boxes put down."""
     rng = np.random.Generator(np.random.PCG64(seed))
     hall = random_warehouse(rng, (size_m, size_m))
     floor = Floor.of(hall)
@@ -41,9 +41,12 @@ def long_log(log: Path, size_m: float, seconds: float, seed: int) -> Path:
             break
         length_m *= 1.05 * seconds / motion.t_s[-1]
     story = Scenario(hall, hall, (*start, 0.0), tour, "", seed, lidar=LIDAR)
-    story = faults.on_structure("racks_moved", story, motion, rng)
+    way = motion.xyyaw[::10, :2]
     story = replace(
-        story, true_resolution_m=0.04, walkers=crowd(floor, motion, PEOPLE, rng), seed=seed
+        story,
+        standing=boxes_added(racks_removed(hall, way, rng), way, rng),
+        true_resolution_m=0.04,
+        walkers=crowd(floor, motion, PEOPLE, rng),
     )
     recording = record(story)
     write_log(log, lambda messages: records(recording, messages))
