@@ -27,7 +27,7 @@ PERSON_CAME_S, PERSON_CAME_AND_WENT_S, PERSON_ELSEWHEN_S = 20.0, 40.0, 20.0
 LOAD_S = 20.0
 #: Where more than this share of what was seen contradicts that it came and went as a whole, it has
 #: moved along, unless it stayed for so long that this is noise of the poses.
-CREPT_SHARE, CREPT_S = 0.35, 15.0
+CREPT_SHARE, CREPT_S = 0.5, 15.0
 #: What stands is met at nearly every look at it: thin legs at this share of them or more. Where
 #: people pass again and again, or follow each other, beams reach through in between.
 STEADY_SHARE = 0.75
@@ -107,8 +107,9 @@ def standing(
     until = nearest_empty(empty & (bins < first[:, None]), earlier=True)
     again = nearest_empty(empty & (bins > last[:, None]), earlier=False)
     course = BIN_S * np.column_stack([until, first, last, again])
-    looked = np.count_nonzero((seen | through) & inside, axis=1)
-    steady = np.count_nonzero(seen & inside, axis=1) / np.maximum(looked, 1)
+    looked = (seen | through) & inside
+    count_met, count_looked = (np.count_nonzero(m, axis=1) for m in (met & looked, looked))
+    steady = count_met / np.maximum(count_looked, 1)
     holds = inside & _things(where, slots, seen_s, course, steady)[:, None]
     return Standing(
         slots, holds, seen, empty, seen_s, np.count_nonzero(empty & inside, axis=1) * BIN_S
