@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from slamreplay.bundle.manifest import Frames
+from slamreplay.bundle.no_return import told_as_range_max
 from slamreplay.bundle.tables import Ragged
-from slamreplay.ingest.lasers import second_scan
-from slamreplay.ingest.roles import choose_scan
+from slamreplay.ingest.lasers import no_returns, second_scan
+from slamreplay.ingest.roles import choose_scan, valid_beams
 from slamreplay.ingest.rows import TopicRows
 
 SCANS = 12
@@ -158,3 +159,27 @@ def test_a_laser_that_tilts_is_left():
 
     assert second is None
     assert "moves on the robot" in first.reason
+
+
+def test_range_max_that_stands_for_no_return_is_counted_and_no_valid_beam():
+    ranges = noisy(FRONT, 0)
+    ranges[:, ::3] = 20.0
+    told = scans("/scan", "front", BEARINGS, ranges)
+    plain = scans("/scan", "front", BEARINGS, noisy(FRONT, 0))
+
+    (loss,) = no_returns([told, plain])
+
+    assert (loss.what, loss.count) == ("/scan", 12 * 81)
+    assert valid_beams(told) == 12 * 160
+    assert valid_beams(plain) == 12 * 241
+
+
+def test_returns_that_happen_to_reach_range_max_are_returns():
+    rng = np.random.Generator(np.random.PCG64(1))
+    ranges = rng.uniform(0.5, 20.2, (200, 360)).astype(np.float32)
+
+    assert not told_as_range_max(ranges, np.full((200, 1), 20.0)).any()
+    ranges[rng.random(ranges.shape) < 0.05] = 20.0
+    assert told_as_range_max(ranges, np.full((200, 1), 20.0)).mean() == pytest.approx(
+        0.05, abs=0.01
+    )

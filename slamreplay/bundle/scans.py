@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from slamreplay.bundle.no_return import told_as_range_max
 from slamreplay.bundle.odometry import odometry_track
 from slamreplay.bundle.track import PoseTrack
 from slamreplay.bundle.view import BundleView
@@ -25,7 +26,8 @@ class ScanSet:
         angle_increment: (N,) rad between beams, signed.
         time_increment_s: (N,) s between beams.
         hits: (N, B) beams with a return inside [range_min, range_max].
-        misses: (N, B) beams that saw free space to the end: +inf (REP-117).
+        misses: (N, B) beams that saw free space to the end: +inf (REP-117), or what the driver
+            writes instead.
         range_max_m: (N,) m.
         xyyaw_base_laser: (3,) the laser's pose on the robot.
         odometry: the motion during a scan, for deskewing; None leaves scans as they are.
@@ -115,6 +117,7 @@ def _scans_of(view: BundleView, role: str, odometry: PoseTrack | None) -> ScanSe
     low, high = table["range_min_m"][:, None], table["range_max_m"][:, None]
     with np.errstate(invalid="ignore"):
         hits = np.isfinite(matrix) & (matrix > 0.0) & (matrix >= low) & (matrix <= high)
+    nothing = told_as_range_max(matrix, high)
     mount, upside_down = _laser_mount(view, str(table["frame_id"][0]))
     sign = -1.0 if upside_down else 1.0
     return ScanSet(
@@ -123,8 +126,8 @@ def _scans_of(view: BundleView, role: str, odometry: PoseTrack | None) -> ScanSe
         sign * table["angle_min_rad"],
         sign * table["angle_increment_rad"],
         table["time_increment_s"],
-        hits,
-        np.isposinf(matrix),
+        hits & ~nothing,
+        np.isposinf(matrix) | nothing,
         table["range_max_m"],
         mount,
         odometry,

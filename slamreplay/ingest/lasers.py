@@ -12,7 +12,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from slamreplay.bundle.manifest import Frames
+from slamreplay.bundle.manifest import Frames, Loss
+from slamreplay.bundle.no_return import told_as_range_max
 from slamreplay.geometry import se3
 from slamreplay.geometry.times import NO_STAMP
 from slamreplay.geometry.transforms import Edge, TransformBuffer
@@ -160,9 +161,24 @@ def _beams(topic: TopicRows, row: int) -> tuple[NDArray[np.float64], NDArray[np.
     ranges = c["ranges_m"][row].astype(np.float64)
     bearings = c["angle_min_rad"][row] + np.arange(len(ranges)) * c["angle_increment_rad"][row]
     with np.errstate(invalid="ignore"):
-        valid = (ranges >= c["range_min_m"][row]) & (ranges <= c["range_max_m"][row])
+        valid = (ranges >= c["range_min_m"][row]) & (ranges < c["range_max_m"][row])
     valid &= np.isfinite(ranges) & (ranges > 0.0)
     return ranges[valid], bearings[valid]
+
+
+def no_returns(topics: Sequence[TopicRows]) -> list[Loss]:
+    """How many beams drivers told as range_max for want of +inf; the bundle keeps them so."""
+    losses = []
+    for topic in topics:
+        if topic.table != "scans" or not len(topic):
+            continue
+        ranges = topic.columns["ranges_m"]
+        far = np.repeat(topic.columns["range_max_m"], ranges.lengths)
+        count = int(np.count_nonzero(told_as_range_max(ranges.values, far)))
+        if count:
+            reason = "beams of exactly range_max are read as beams without a return"
+            losses.append(Loss(kind="repaired", what=topic.topic, count=count, reason=reason))
+    return losses
 
 
 def _times(topic: TopicRows) -> NDArray[np.int64]:

@@ -13,6 +13,7 @@ from slamreplay.bundle.tables import Table
 from slamreplay.bundle.view import Bundle
 from slamreplay.ingest.cast import settle_cast
 from slamreplay.ingest.clock import choose_clock, row_times
+from slamreplay.ingest.lasers import no_returns
 from slamreplay.ingest.layers import lay_out
 from slamreplay.ingest.options import IngestOptions
 from slamreplay.ingest.overrides import check_topics, read_overrides
@@ -61,7 +62,7 @@ def ingest(
     check_topics(overrides, sorted({t.topic for t in topics}), options.topics)
     cast = settle_cast(topics, overrides)
     layers = lay_out(cast, options.map)
-    losses = [*losses, *lost, *cast.losses, *layers.losses]
+    losses = [*losses, *lost, *cast.losses, *layers.losses, *no_returns(cast.topics)]
     sources += layers.sources
 
     clock = choose_clock(cast.topics)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from slamreplay.bundle.manifest import Frames
+from slamreplay.bundle.no_return import told_as_range_max
 from slamreplay.ingest.names import (
     basename,
     is_gnss,
@@ -228,6 +229,7 @@ def valid_beams(topic: TopicRows) -> float:
     near = np.repeat(topic.columns["range_min_m"], ranges.lengths)
     with np.errstate(invalid="ignore"):
         inside = (ranges.values >= near) & (ranges.values <= far) & (ranges.values > 0)
+    inside &= ~told_as_range_max(ranges.values, far)
     return float(inside.sum())
 
 
