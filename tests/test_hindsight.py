@@ -12,6 +12,7 @@ from slamreplay.bundle.tables import Ragged, Table
 from slamreplay.bundle.view import Bundle, BundleView
 from slamreplay.geometry import se2, se3
 from slamreplay.geometry.times import NS_PER_S
+from slamreplay.hindsight import scale
 from slamreplay.hindsight.pipeline import hindsight
 from slamreplay.ingest.options import IngestOptions
 from slamreplay.ingest.pipeline import ingest
@@ -274,3 +275,20 @@ def test_a_second_laser_that_sees_another_world_does_not_hide_the_first():
     assert found is not None
     assert found.coverage > 0.99
     assert np.percentile(errors(found)[:, 0], 95) < 0.08
+
+
+@pytest.mark.parametrize("times", [0.85, 1.12])
+def test_scale_of_the_map_is_told(times):
+    bundle, room = synthetic_bundle(seconds=20.0), room_grid()
+    drawn = OccupancyGrid(room.cells, times * room.resolution_m, times * room.origin_xyyaw)
+    found = hindsight(bundle.view().with_grid(drawn))
+
+    assert found.scale == pytest.approx(times, rel=0.03)
+
+
+def test_map_to_scale_is_left_at_that(healthy, monkeypatch):
+    monkeypatch.setattr(scale, "ASK_BELOW", 1.1)
+    found = hindsight(synthetic_bundle(seconds=20.0, world=changed_room()).view())
+
+    assert healthy.scale is None
+    assert found.scale is None

@@ -161,6 +161,16 @@ def test_a_map_of_another_place_is_said():
         assert "SR-MAP-WRONG" in ids(judgement)
 
 
+def test_a_map_out_of_scale_is_said_with_its_scale():
+    bundle = synthetic_bundle()
+    hindsight = replace(hindsight_of(bundle, match=0.65, margin=0.3), scale=1.08)
+    judgement = judged(bundle, hindsight)
+
+    assert (judgement.state, judgement.failure_mode.kind) == ("insufficient_data", "wrong_map")
+    assert "1.08 times as large" in judgement.summary
+    assert any("1.08" in f.message for f in judgement.findings if f.id == "SR-MAP-WRONG")
+
+
 def test_places_that_odometry_contradicts_all_along_are_no_fit():
     bundle = synthetic_bundle(seconds=30)
     t = (at_scans(bundle) - START_NS) / 1e9

@@ -101,7 +101,8 @@ FINDINGS: dict[str, Explanation] = {
     "SR-MAP-WRONG": Explanation(
         "The map is of another place",
         "Do the scans fit anywhere in the map?",
-        "The best sequence of places explains too few beams.",
+        "The best sequence of places explains too few beams; or it explains clearly more once the "
+        "scans are laid out at another scale, which is then named.",
         "A building that was rebuilt altogether.",
     ),
     "SR-CON-001": Explanation(

@@ -86,6 +86,8 @@ class Hindsight:
         lead: (N,) by how much the place of the stretch around each scan beats the best different
             one, in mean score of that stretch; inf where there is no different one, empty where it
             was not asked. The margin is about the whole log, this about one moment.
+        scale: how many times larger than the place the map is drawn; None where it is to scale, or
+            where no scale fits.
     """
 
     track: PoseTrack
@@ -96,3 +98,4 @@ class Hindsight:
     changes: Changes | None
     joined: Mapping[str, int] = field(default_factory=lambda: MappingProxyType({}))
     lead: se2.Array = field(default_factory=lambda: np.empty(0))
+    scale: float | None = None

@@ -31,6 +31,7 @@ from slamreplay.hindsight.places import (
 )
 from slamreplay.hindsight.pooling import pooled
 from slamreplay.hindsight.reseating import reseated
+from slamreplay.hindsight.scale import map_scale
 from slamreplay.hindsight.search import hypotheses_of
 from slamreplay.hindsight.seating import seat_keyframes
 from slamreplay.hindsight.sensing import sensed
@@ -161,6 +162,7 @@ def _rebuilt(
         changes,
         {} if other is None else other.joined(),
         np.where(laid.is_held, lead[share], 0.0),
+        map_scale(space, found, places),
     )
 
 

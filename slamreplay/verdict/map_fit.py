@@ -4,6 +4,8 @@ Another floor or another scale is seldom empty of places where a scan fits half-
 tells alone. In the right map a typical scan scores 0.8 and more, changed aisles included, and the
 best sequence of places stands clear of every other; in the wrong one the score is mediocre and many
 sequences are as mediocre, or the places only fit if the robot moved otherwise than its wheels say.
+A map out of scale is told by the scale that fits (`slamreplay.hindsight.scale`): halls drawn a
+tenth too large keep a clear margin.
 Measured on 12 right and 29 wrong pairs of log and map (other places, mirrored, scales 0.8 to 1.3):
 right ones score at least 0.83 with a margin of at least 0.12, wrong ones have a margin of at most
 0.09.
@@ -36,21 +38,26 @@ class MapFit:
             there is no odometry.
         fits: whether the verdict may be built on it.
         text: why not, with the numbers.
+        scale: how many times larger than the place the map is drawn, where that is why.
     """
 
     typical: float | None
     disagreement: float
     fits: bool
     text: str
+    scale: float | None = None
 
 
 def map_fit(view: BundleView, hindsight: Hindsight, limits: Limits) -> MapFit:
     """Whether the map is of the place the log was recorded in."""
     match = hindsight.match[hindsight.track.has_pose]
     match = match[np.isfinite(match)]
-    if not len(match):
+    typical = float(np.median(match)) if len(match) else None
+    if hindsight.scale is not None:
+        text = f"the map is drawn {hindsight.scale:.2f} times as large as the place"
+        return MapFit(typical, 0.0, fits=False, text=text, scale=hindsight.scale)
+    if typical is None:
         return MapFit(None, 0.0, fits=False, text="no scan has a place in this map")
-    typical = float(np.median(match))
     disagreement = _disagreement(view, hindsight)
     clear = hindsight.margin is None or hindsight.margin >= limits.clear_margin
     if typical < limits.fits_from:

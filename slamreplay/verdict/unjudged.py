@@ -49,6 +49,9 @@ def unjudged(
         elif fit is not None:
             ids, reason = ("SR-MAP-WRONG",), "its scans fit nowhere in this map"
             words = ("no place in the map explains the scans: another floor, scale or building",)
+            if fit.scale is not None:
+                reason = fit.text
+                words = (f"{fit.text}: laid out so much larger the scans fit it",)
             mode = FailureMode("wrong_map", 0.7, words)
     else:
         mode = FailureMode("sensing_ambiguity", 0.7, ("two places explain all scans equally well",))
