@@ -24,7 +24,8 @@ from slamreplay.hindsight.changes import find_changes
 from slamreplay.hindsight.evidence import bins_of_each, end_cells, lattice, marks, passes
 from slamreplay.hindsight.occupancy import taken
 from slamreplay.hindsight.regions import confidence
-from slamreplay.hindsight.standing import nearest_empty, standing
+from slamreplay.hindsight.standing import nearest_empty, standing, things
+from slamreplay.hindsight.veils import veils
 from slamreplay.maps.grid import OccupancyGrid
 from slamreplay.maps.map_server import map_files, read_map
 from slamreplay.maps.raycast import cast_rays
@@ -473,3 +474,40 @@ def test_marks_and_counts_of_bins_equal_their_plain_twins():
 
     np.testing.assert_array_equal(bins_of_each(where, cells, bins), count)
     np.testing.assert_array_equal(marks(where, cells, bins, slots, 1, 1000), seen)
+
+
+def test_veil_hangs_between_an_edge_and_what_lies_behind():
+    """Beams over 3 deg meet a post at 2 m, and a wall at 6 m behind it."""
+    bearings = np.radians(np.arange(-5.0, 6.0))
+    reach = np.array([6.0, 6.0, 6.0, 4.0, 2.0, 2.0, 2.0, 3.1, 6.0, 6.0, 6.0])
+    at_edges = [3, 7]
+
+    def seen(reach, kind):
+        ends = np.column_stack([reach * np.cos(bearings), reach * np.sin(bearings)])[None]
+        return veils(Beams(np.zeros(1, np.int64), ends.astype(np.float32), kind[None], np.zeros(2)))
+
+    hit = np.full(11, HIT, dtype=np.int8)
+    nothing = np.where(reach == 6.0, MISS, HIT).astype(np.int8)
+    pole = np.where(np.arange(11) == 5, 2.0, 6.0)
+    gap = np.where(np.arange(11) == 5, 6.0, 2.0)
+
+    assert np.flatnonzero(seen(reach, hit)[0]).tolist() == at_edges
+    assert np.flatnonzero(seen(reach, nothing)[0]).tolist() == at_edges
+    assert not seen(pole, hit).any()  # thin, but in front of all
+    assert not seen(gap, hit).any()
+
+
+def test_thing_is_as_large_as_the_parts_that_stay():
+    """A person who stood for 12 s and went, with points that hung about for 4.5 s."""
+    where = lattice(working_map(hall()), np.arange(60) * S // 2)
+    slots = np.full(where.shape, -1, dtype=np.int32)
+    slots[40, 40:55] = np.arange(15)
+    hung = np.full(15, 4.5)
+    stood = np.where(np.abs(np.arange(15) - 7) < 2, 12.0, 4.5)
+    course = np.tile([-np.inf, 0.0, 12.0, 13.0], (15, 1))
+
+    def is_change(seen_s):
+        return things(where, slots, seen_s, course, np.ones(15)).all()
+
+    assert not is_change(stood)
+    assert is_change(hung)  # as long all over: no person is as wide

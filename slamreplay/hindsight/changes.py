@@ -20,6 +20,7 @@ from slamreplay.hindsight.gone import gone
 from slamreplay.hindsight.reach import is_lossy, proven_reach_m
 from slamreplay.hindsight.regions import Contradictions, changed_regions
 from slamreplay.hindsight.standing import asked_cells, standing
+from slamreplay.hindsight.veils import veils
 from slamreplay.maps.grid import OccupancyGrid
 from slamreplay.matching.field import WorkingMap, working_map
 
@@ -62,16 +63,19 @@ def _look(
     blind = (beams.kind == MISS) & (laid.says == BEYOND) & ~(laid.wall_m + BEYOND_M < reach_m)
     laid.says[blind] = SILENT
     laid.says[_near_a_wall(working, laid)] = SILENT
+    veil = veils(beams)
+    solid = replace(laid, says=np.where(veil, np.int8(SILENT), laid.says))
     where = lattice(working, beams.t_ns)
     if is_lossy(where, beams, laid):
         laid.is_sure[beams.kind == MISS] = False
         reach_m = 0.0
-    slots, count = asked_cells(where, laid)
+    slots, count = asked_cells(where, solid)
     passed = passes(where, beams, poses, reach_m, slots, count)
     ends = end_cells(where, beams, poses)
     bins = np.broadcast_to(where.bins[:, None], beams.kind.shape)[beams.kind == HIT]
     ended = (ends[ends >= 0], bins[ends >= 0])
-    new = standing(where, laid, slots, passed.through, ended)
+    met = (ends >= 0) & ~veil[beams.kind == HIT]  # a veil fills no place, but hides a wall
+    new = standing(where, solid, slots, passed.through, (ends[met], bins[met]))
     away = gone(where, laid, ended)
     is_new = _at(where, laid, NEARER, new.slots, new.holds)
     is_gone = _at(where, laid, BEYOND, away.slots, away.holds)

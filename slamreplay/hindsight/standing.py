@@ -16,6 +16,9 @@ from slamreplay.hindsight.occupancy import taken
 STANDING_S = 4.0
 #: Cells seen for this long belong to what stands beside them.
 BESIDE_S = 1.0
+#: How large a thing is, is asked of the parts seen for this share of the longest time: what sways
+#: or hangs about it is seen more briefly.
+CORE_SHARE = 0.6
 #: Somebody was watching if the cell was seen empty no longer than this before or after.
 WATCHED_S = 3.0
 #: What is no larger, noise and the lattice included, may be a person, m.
@@ -27,7 +30,7 @@ PERSON_CAME_S, PERSON_CAME_AND_WENT_S, PERSON_ELSEWHEN_S = 20.0, 40.0, 20.0
 LOAD_S = 20.0
 #: Where more than this share of what was seen contradicts that it came and went as a whole, it has
 #: moved along, unless it stayed for so long that this is noise of the poses.
-CREPT_SHARE, CREPT_S = 0.5, 15.0
+CREPT_SHARE, CREPT_S = 0.35, 15.0
 #: What stands is met at nearly every look at it: thin legs at this share of them or more. Where
 #: people pass again and again, or follow each other, beams reach through in between.
 STEADY_SHARE = 0.75
@@ -110,7 +113,7 @@ def standing(
     looked = (seen | through) & inside
     count_met, count_looked = (np.count_nonzero(m, axis=1) for m in (met & looked, looked))
     steady = count_met / np.maximum(count_looked, 1)
-    holds = inside & _things(where, slots, seen_s, course, steady)[:, None]
+    holds = inside & things(where, slots, seen_s, course, steady)[:, None]
     return Standing(
         slots, holds, seen, empty, seen_s, np.count_nonzero(empty & inside, axis=1) * BIN_S
     )
@@ -157,7 +160,7 @@ def nearest_empty(empty: NDArray[np.bool_], *, earlier: bool) -> NDArray[np.floa
     return out if earlier else np.where(np.isfinite(out), count - 1 - out, np.inf)
 
 
-def _things(
+def things(
     where: Lattice,
     slots: NDArray[np.int32],
     seen_s: NDArray[np.float64],
@@ -187,7 +190,7 @@ def _things(
         if np.average(steady[of_it], weights=seen_s[of_it]) < STEADY_SHARE:
             continue
         longest_s = float(seen_s[of_it].max())
-        core = of_it[seen_s[of_it] >= min(STANDING_S, longest_s)]
+        core = of_it[seen_s[of_it] >= max(min(STANDING_S, longest_s), CORE_SHARE * longest_s)]
         size_m = float(np.ptp(cells[core], axis=0).max() + 1) * where.cell_m
         out[of_it] = longest_s >= _needed_s(size_m, seen_s[core], course_s[core])
     return out
@@ -198,7 +201,9 @@ def _needed_s(size_m: float, seen_s: NDArray[np.float64], course_s: NDArray[np.f
     until, first, last, again = course_s.T
     # What comes comes whole: if one part of the place was still empty after another was taken,
     # something moved along there.
-    crept = (until > np.quantile(first, 0.1) + 1.0) | (again < np.quantile(last, 0.9) - 1.0)
+    # Parts that are taken to the end came into view one by one, or were parked: they count not.
+    crept = (until > np.quantile(first, 0.1) + 1.0) & np.isfinite(again)
+    crept |= again < np.quantile(last, 0.9) - 1.0
     if np.average(crept, weights=seen_s) > CREPT_SHARE:
         return max(CREPT_S, _needed_unless_it_crept_s(size_m, course_s))
     return _needed_unless_it_crept_s(size_m, course_s)
