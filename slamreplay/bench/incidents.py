@@ -41,7 +41,7 @@ KINDS: tuple[str, ...] = (
 )
 #: Logs last this long, s; the robot never comes nearer than that to anything, m.
 _SHORTEST_S, _LONGEST_S, _LEAST_CLEAR_M = 58.0, 120.0, 0.27
-_ATTEMPTS = 40
+_ATTEMPTS = 400
 
 
 @dataclass(frozen=True, eq=False)
