@@ -47,15 +47,20 @@ def cost_of(bundle: Path) -> dict[str, float]:
     return {"cpu_s": cpu_s, "peak_mb": peak_mb}
 
 
+def said(*arguments: object) -> str:
+    """What another process of this file prints."""
+    command = [sys.executable, __file__, *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, check=True, text=True).stdout.strip()
+
+
 def main(folder: Path) -> None:
     """Measure each case in a process of its own, whose kernels were compiled before."""
     folder.mkdir(parents=True, exist_ok=True)
     print("| map | log | CPU | peak memory |\n|---|---|---|---|")
+    # A process begins with its parent's peak memory: this one must stay small.
     for warm, (edge_m, seconds) in enumerate((CASES[0], *CASES)):
-        bundle = prepared(folder, edge_m, seconds)
-        command = [sys.executable, __file__, "--one", str(bundle)]
-        said = subprocess.run(command, capture_output=True, check=True, text=True).stdout
-        cost = json.loads(said)
+        bundle = said("--prepare", folder, edge_m, seconds)
+        cost = json.loads(said("--one", bundle))
         if warm:
             size = f"{edge_m} x {edge_m} m"
             print(f"| {size} | {seconds} s | {cost['cpu_s']:.1f} s | {cost['peak_mb']:.0f} MB |")
@@ -64,5 +69,7 @@ def main(folder: Path) -> None:
 if __name__ == "__main__":
     if sys.argv[1] == "--one":
         print(json.dumps(cost_of(Path(sys.argv[2]))))
+    elif sys.argv[1] == "--prepare":
+        print(prepared(Path(sys.argv[2]), int(sys.argv[3]), int(sys.argv[4])))
     else:
         main(Path(sys.argv[1]))
