@@ -59,7 +59,7 @@ def is_right(one: Measured) -> bool:
 
 def named(logs: Sequence[Measured]) -> dict[str, int]:
     """How often each failure mode was named, the most frequent first."""
-    counts = Counter(str(m.facts.get("failure_mode")) for m in logs)
+    counts = Counter(m.facts["failure_mode"] for m in logs if "failure_mode" in m.facts)
     return dict(sorted(counts.items(), key=lambda item: (-item[1], item[0])))
 
 
