@@ -16,9 +16,10 @@ from slamreplay.matching.whole_map import SearchSpace, search_map
 ASK_BELOW = 0.75
 #: Scales that are tried, 3 % apart; nearer to 1 than the first one a map is to scale.
 SCALES = tuple(float(s) for s in np.exp(np.arange(0.05, 0.36, 0.03)))
-#: So many submaps are asked, of points up to this far; another scale must fit better by this. Of 7
-#: maps out of scale by 8 to 26 % the right one fitted better by 0.28 to 0.49, and no other scale
-#: fitted any of 9 logs in right maps better, 7 of them with half of the structure changed.
+#: So many submaps are asked, of points up to this far; another scale must fit better by this. With
+#: four submaps, of 7 maps out of scale by 8 to 26 % the right one fitted better by 0.28 to 0.49,
+#: and no other scale fitted any of 9 logs in right maps better, 6 of them with half of the
+#: structure changed.
 ASKED, RADIUS_M, GAIN = 3, 8.0, 0.15
 
 

@@ -1,8 +1,8 @@
 """Veils: returns from between an edge and what lies behind it, where nothing is.
 
-A beam that half meets an edge measures a mean of both ranges (mixed pixels; Tang, Huber and Akinci,
-3DIM 2007). Behind each leg of a person hangs such a veil. Points far apart on a wall that beams
-graze look the same, and say as little.
+A beam that half meets an edge measures something between both ranges (a mixed pixel). Behind each
+leg of a person hangs such a veil. Points far apart on a wall that beams graze look the same, and
+say as little.
 """
 
 from __future__ import annotations
