@@ -171,7 +171,7 @@ class _Batch:
         if not items:
             return
         try:
-            decoded = self._decoder.decode(Messages(items, t_log))
+            decoded = self._decoder.decode(Messages(items, t_log, self.connection.topic))
         except AttributeError as error:  # a log may define a type of this name differently
             self._broken += [f"its definition is another one: {error}"] * len(items)
             return

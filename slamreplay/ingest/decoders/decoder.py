@@ -23,10 +23,12 @@ class Messages:
         items: deserialised messages, in the order they were read: objects with the fields of the
             message definition as attributes.
         t_log_ns: (N,) when each was recorded.
+        topic: its name, for types whose meaning stands in it (an action's status, a signal).
     """
 
-    def __init__(self, items: Sequence[Any], t_log_ns: Times) -> None:
+    def __init__(self, items: Sequence[Any], t_log_ns: Times, topic: str = "") -> None:
         self._items = items
+        self.topic = topic
         self.t_log_ns = np.asarray(t_log_ns, dtype=np.int64)
 
     def __len__(self) -> int:
@@ -94,7 +96,7 @@ class Messages:
         get = attrgetter(path)
         lists = [get(m) for m in self._items]
         rows = np.repeat(np.arange(len(lists)), [len(x) for x in lists]).astype(np.int64)
-        return Messages([e for x in lists for e in x], self.t_log_ns[rows]), rows
+        return Messages([e for x in lists for e in x], self.t_log_ns[rows], self.topic), rows
 
     @cached_property
     def every(self) -> NDArray[np.int64]:
