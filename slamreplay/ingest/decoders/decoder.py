@@ -98,6 +98,11 @@ class Messages:
         rows = np.repeat(np.arange(len(lists)), [len(x) for x in lists]).astype(np.int64)
         return Messages([e for x in lists for e in x], self.t_log_ns[rows], self.topic), rows
 
+    def take(self, mask: NDArray[np.bool_]) -> Messages:
+        """The messages where the mask (N,) is true."""
+        items = [m for m, wanted in zip(self._items, mask, strict=True) if wanted]
+        return Messages(items, self.t_log_ns[mask], self.topic)
+
     @cached_property
     def every(self) -> NDArray[np.int64]:
         """(N,) 0 to N-1: the `rows` of a decoder that makes one row of each message."""

@@ -47,10 +47,11 @@ def _transforms(messages: Messages) -> Decoded:
 def _detections(messages: Messages) -> Decoded:
     """apriltag_ros: `int32[] id`, a bundle of tags being one detection of several ids."""
     seen, rows = messages.children("detections")
-    single = np.array([len(m.id) == 1 for m in seen], dtype=bool)
+    ids = seen.ragged("id", np.int64)
+    single: NDArray[np.bool_] = ids.lengths == 1
     bundles = Remark("skipped", int((~single).sum()), "a bundle of several tags")
-    one = Messages([m for m, s in zip(seen, single, strict=True) if s], seen.t_log_ns[single])
-    names = [f"tag_{int(m.id[0])}" for m in one]
+    one = seen.take(single)
+    names = [f"tag_{tag}" for tag in one.ragged("id", np.int64).values]
     paths = ("pose.pose.pose.position", "pose.pose.pose.orientation")
     covariance = one.fixed("pose.pose.covariance", 36)
     return _sightings(messages, one, rows[single], paths, names, covariance, (bundles,))
