@@ -609,7 +609,8 @@ def test_a_cut_log_is_read_up_to_the_cut_or_refused_in_one_line(logs, tmp_path, 
     bundle = ingest([path], tmp_path / "b")
     assert 0 < len(bundle.table("scans")) < 400
     (lost,) = [entry for entry in bundle.manifest.losses if entry.kind == "lost"]
-    assert "broken" in lost.reason
+    assert "cut within a chunk" in lost.reason
+    assert lost.last_good_ns == bundle.table("scans")["t_log_ns"].max()
 
 
 @pytest.mark.parametrize("name", ["log.mcap", "one.bag", "log.db3"])

@@ -149,11 +149,11 @@ def _present(
 
 def _sorted(losses: Sequence[Loss]) -> list[Loss]:
     """Losses of one kind and reason added up, in a fixed order."""
-    counts: dict[tuple[str, str, str], int] = {}
+    found: dict[tuple[str, str, str], Loss] = {}
     for loss in losses:
         key = (loss.kind, loss.what, loss.reason)
-        counts[key] = counts.get(key, 0) + loss.count
-    return [
-        Loss(kind=kind, what=what, count=count, reason=reason)  # type: ignore[arg-type]
-        for (kind, what, reason), count in sorted(counts.items())
-    ]
+        before = found.get(key)
+        if before is not None:
+            loss = loss.model_copy(update={"count": before.count + loss.count})
+        found[key] = loss
+    return [found[key] for key in sorted(found)]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import struct
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -15,12 +14,10 @@ from slamreplay.bundle.tables import Ragged
 from slamreplay.errors import LogError
 from slamreplay.geometry.times import Times
 from slamreplay.ingest import DECODERS
-from slamreplay.ingest.decoders.decoder import Decoder, Messages
-from slamreplay.ingest.readers.reader import Connection, Reader
-from slamreplay.ingest.types import deserialiser
-
-#: Payload bytes of one topic that are held before they are decoded.
-_BATCH_BYTES = 32_000_000
+from slamreplay.ingest.decoders.decoder import Decoder, FieldError, Messages
+from slamreplay.ingest.readers.reader import Block, Connection, Reader
+from slamreplay.ingest.types import layouts
+from slamreplay.ingest.wire.read import read_messages
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,24 +87,28 @@ def read_rows(
     total = max(sum(c.count for reader in readers for c in reader.connections), 1)
     read = 0
     for reader in readers:
-        batches = _batches(reader, skip, losses)
-        for index, t_log_ns, data in reader.messages(set(batches)):
-            read += 1
-            if progress is not None and read % 2000 == 0:
+        topics = _topics(reader, skip, losses)
+        for block in reader.blocks(set(topics)):
+            order = np.argsort(block.connection, kind="stable")
+            ends = np.cumsum(np.bincount(block.connection, minlength=len(reader.connections)))
+            for connection, topic in topics.items():
+                index = order[ends[connection - 1] if connection else 0 : ends[connection]]
+                if len(index):
+                    topic.add(block, index)
+            read += len(block)
+            if progress is not None:
                 progress("reading", min(read / total, 1.0))
-            batches[index].add(t_log_ns, data)
-        for batch in batches.values():
-            key = (batch.connection.topic, batch.connection.type)
-            parts.setdefault(key, []).extend(batch.finish(losses))
+        for topic in topics.values():
+            key = (topic.connection.topic, topic.connection.type)
+            parts.setdefault(key, []).extend(topic.finish(losses))
         losses.extend(reader.losses)
-    rows = [_joined(found) for _, found in sorted(parts.items()) if found]
-    return rows, losses
+    return [_joined(parts.pop(key)) for key in sorted(parts) if parts[key]], losses
 
 
-def _batches(
+def _topics(
     reader: Reader, skip: Callable[[str], str | None], losses: list[Loss]
-) -> dict[int, _Batch]:
-    batches = {}
+) -> dict[int, _Topic]:
+    topics = {}
     for connection in reader.connections:
         reason = skip(connection.topic)
         if reason is None and connection.type not in DECODERS:
@@ -116,64 +117,54 @@ def _batches(
             continue
         if reason is None:
             try:
-                batches[connection.index] = _Batch(connection)
+                topics[connection.index] = _Topic(connection)
                 continue
             except LogError as error:
                 reason = str(error)
         what = f"{connection.topic} ({connection.type or connection.encoding})"
         losses.append(Loss(kind="skipped", what=what, count=connection.count, reason=reason))
-    return batches
+    return topics
 
 
-class _Batch:
-    """Payloads of one connection on their way to rows."""
+class _Topic:
+    """One connection on its way from blocks to rows."""
 
     def __init__(self, connection: Connection) -> None:
         self.connection = connection
-        self._deserialise = deserialiser(connection)
+        self._layouts = layouts(connection)
         self._decoder: Decoder = DECODERS.load(connection.type)
-        self._payloads: list[bytes] = []
-        self._times: list[int] = []
-        self._bytes = 0
-        self._broken: list[str] = []
+        self._broken: dict[str, tuple[int, int]] = {}
         self._remarks: dict[tuple[Any, str], int] = {}
         self._done: list[TopicRows] = []
 
-    def add(self, t_log_ns: int, data: bytes) -> None:
-        self._payloads.append(data)
-        self._times.append(t_log_ns)
-        self._bytes += len(data)
-        if self._bytes > _BATCH_BYTES:
-            self._decode()
+    def add(self, block: Block, index: NDArray[np.int64]) -> None:
+        """Decode the messages of a block at `index`."""
+        t_log_ns = block.t_log_ns[index]
+        unread = np.ones(len(index), dtype=bool)
+        for messages, found in read_messages(
+            block.data, block.start[index], block.end[index], t_log_ns, self.connection.topic,
+            self._layouts, self.connection.encoding,
+        ):  # fmt: skip
+            unread[found] = False
+            self._decode(messages)
+        if unread.any():
+            self._lose("its bytes do not fit its type", t_log_ns[unread])
 
     def finish(self, losses: list[Loss]) -> list[TopicRows]:
         """The decoded rows; what went wrong is added to `losses`."""
-        if self._payloads:
-            self._decode()
-        if self._broken:
-            reason = f"cannot be decoded: {self._broken[0]}"
-            count = len(self._broken)
-            losses.append(Loss(kind="lost", what=self.connection.topic, count=count, reason=reason))
+        what = self.connection.topic
+        for reason, (count, t_log_ns) in self._broken.items():
+            said = f"cannot be decoded: {reason} (first at log time {t_log_ns} ns)"
+            losses.append(Loss(kind="lost", what=what, count=count, reason=said))
         for (kind, reason), count in self._remarks.items():
-            losses.append(Loss(kind=kind, what=self.connection.topic, count=count, reason=reason))
+            losses.append(Loss(kind=kind, what=what, count=count, reason=reason))
         return self._done
 
-    def _decode(self) -> None:
-        items, times = [], []
-        for t_log_ns, data in zip(self._times, self._payloads, strict=True):
-            try:
-                items.append(self._deserialise(data))
-                times.append(t_log_ns)
-            except (ValueError, KeyError, IndexError, struct.error, _serde_error()) as error:
-                self._broken.append(f"{error} (log time {t_log_ns} ns)")
-        t_log = np.array(times, dtype=np.int64)
-        self._payloads, self._times, self._bytes = [], [], 0
-        if not items:
-            return
+    def _decode(self, messages: Messages) -> None:
         try:
-            decoded = self._decoder.decode(Messages(items, t_log, self.connection.topic))
-        except AttributeError as error:  # a log may define a type of this name differently
-            self._broken += [f"its definition is another one: {error}"] * len(items)
+            decoded = self._decoder.decode(messages)
+        except FieldError as error:  # a log may define a type of this name differently
+            self._lose(f"its definition is another one: {error}", messages.t_log_ns)
             return
         for remark in decoded.remarks:
             if remark.count:
@@ -183,19 +174,17 @@ class _Batch:
             TopicRows(
                 self.connection.topic,
                 self.connection.type,
-                len(items),
+                len(messages),
                 self._decoder.table,
                 decoded.columns,
                 np.asarray(decoded.t_sensor_ns, dtype=np.int64),
-                t_log[decoded.rows],
+                messages.t_log_ns[decoded.rows],
             )
         )
 
-
-def _serde_error() -> type[Exception]:
-    from rosbags.serde import SerdeError
-
-    return SerdeError
+    def _lose(self, reason: str, t_log_ns: Times) -> None:
+        count, first = self._broken.get(reason, (0, int(t_log_ns[0])))
+        self._broken[reason] = (count + len(t_log_ns), first)
 
 
 def _joined(parts: Sequence[TopicRows]) -> TopicRows:
@@ -208,11 +197,15 @@ def _joined(parts: Sequence[TopicRows]) -> TopicRows:
         t_sensor_ns=np.concatenate([p.t_sensor_ns for p in parts]),
         t_log_ns=np.concatenate([p.t_log_ns for p in parts]),
     )
+    if (whole.t_log_ns[1:] >= whole.t_log_ns[:-1]).all():
+        return whole
     return whole.take(np.argsort(whole.t_log_ns, kind="stable"))
 
 
 def _concatenate(columns: Iterable[Any]) -> Any:
     columns = list(columns)
+    if len(columns) == 1:
+        return columns[0]
     if not isinstance(columns[0], Ragged):
         return np.concatenate(columns)
     lengths = np.concatenate([c.lengths for c in columns])
