@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -10,6 +10,13 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
+from slamreplay.bundle.arrow import (
+    nulls_from_arrow,
+    numbers_from_arrow,
+    numbers_to_arrow,
+    texts_from_arrow,
+    texts_to_arrow,
+)
 from slamreplay.bundle.schema import Column, TableSchema
 from slamreplay.errors import BundleError
 from slamreplay.geometry.times import NO_STAMP
@@ -52,6 +59,12 @@ class Ragged:
         """(N,) entries in each row."""
         return np.diff(self.offsets)
 
+    def spread(self, numbers: NDArray[Any]) -> NDArray[Any]:
+        """One number a row (N,) as one an entry; a single one where all rows have the same."""
+        if len(numbers) and bool((numbers == numbers[0]).all()):
+            return numbers[:1]
+        return np.repeat(numbers, self.lengths)
+
     def take(self, index: NDArray[np.int64]) -> Ragged:
         """The rows at `index`, in that order."""
         lengths = self.lengths[index]
@@ -61,6 +74,17 @@ class Ragged:
 
 
 ColumnData = NDArray[Any] | Ragged
+
+
+def concatenated(columns: Sequence[Any]) -> Any:
+    """Columns of one kind, one after the other; a single one as it is."""
+    if len(columns) == 1:
+        return columns[0]
+    if not isinstance(columns[0], Ragged):
+        return np.concatenate(columns)
+    offsets = np.concatenate([[0], np.cumsum(np.concatenate([c.lengths for c in columns]))])
+    values = [c.values[c.offsets[0] : c.offsets[-1]] for c in columns]
+    return Ragged(np.concatenate(values), offsets.astype(np.int64))
 
 
 class Table:
@@ -122,6 +146,9 @@ class Table:
 
     def sorted_by_time(self) -> Table:
         """Rows ordered by `t_ns`, then by log time; equal rows keep their order."""
+        steps, log_steps = np.diff(self.t_ns), np.diff(self["t_log_ns"])
+        if bool(((steps > 0) | ((steps == 0) & (log_steps >= 0))).all()):
+            return self
         return self.take(np.lexsort((self["t_log_ns"], self.t_ns)))
 
     def to_arrow(self) -> pa.Table:
@@ -148,10 +175,11 @@ class Table:
     def concat(cls, schema: TableSchema, tables: Iterable[Table]) -> Table:
         """All rows, one table after the other."""
         parts = list(tables)
-        if not parts:
-            return cls.empty(schema)
-        whole = pa.concat_tables([t.to_arrow() for t in parts])
-        return cls.from_arrow(schema, whole)
+        if len(parts) < 2:
+            return parts[0] if parts else cls.empty(schema)
+        return cls(
+            schema, {c.name: concatenated([t[c.name] for t in parts]) for c in schema.columns}
+        )
 
 
 def _checked(column: Column, data: Any, table: str) -> ColumnData:
@@ -176,28 +204,34 @@ def _checked(column: Column, data: Any, table: str) -> ColumnData:
 
 
 def _to_arrow(column: Column, data: ColumnData) -> pa.Array:
+    kind = column.arrow_type
     if isinstance(data, Ragged):
-        values = pa.array(data.values, type=column.arrow_type.value_type)
-        return pa.ListArray.from_arrays(pa.array(data.offsets, type=pa.int32()), values)
+        values = numbers_to_arrow(data.values, kind.value_type)
+        offsets = numbers_to_arrow(data.offsets.astype(np.int32), pa.int32())
+        return pa.ListArray.from_arrays(offsets, values)
     if column.size:
-        flat = pa.array(np.ascontiguousarray(data).ravel(), type=column.arrow_type.value_type)
+        flat = numbers_to_arrow(np.ascontiguousarray(data).ravel(), kind.value_type)
         return pa.FixedSizeListArray.from_arrays(flat, column.size)
-    if column.name == "t_sensor_ns":
-        return pa.array(data, type=pa.int64(), mask=data == NO_STAMP)
-    return pa.array(data, type=column.arrow_type)
+    if column.kind == "str":
+        return texts_to_arrow(data)
+    valid = data != NO_STAMP if column.name == "t_sensor_ns" else None
+    return numbers_to_arrow(data, kind, valid)
 
 
 def _from_arrow(column: Column, chunked: pa.ChunkedArray) -> ColumnData:
     array = chunked.combine_chunks()
     if isinstance(array, pa.ChunkedArray):
         array = pa.concat_arrays(array.chunks) if array.num_chunks else pa.array([], array.type)
+    if column.kind == "str":
+        return texts_from_arrow(array)
+    dtype = _DTYPES[column.kind]
     if column.kind.startswith("list_"):
-        offsets = np.asarray(array.offsets, dtype=np.int64)
-        values = array.values.slice(offsets[0], offsets[-1] - offsets[0])
-        return Ragged(values.to_numpy(zero_copy_only=False), offsets - offsets[0])
+        offsets = numbers_from_arrow(array.offsets, np.int32).astype(np.int64)
+        values = numbers_from_arrow(array.values, dtype)[offsets[0] : offsets[-1]]
+        return Ragged(values, offsets - offsets[0])
     if column.size:
-        flat = array.flatten().to_numpy(zero_copy_only=False)
-        return np.asarray(flat).reshape((-1, column.size))
-    if column.name == "t_sensor_ns":
-        return np.asarray(array.fill_null(NO_STAMP).to_numpy(zero_copy_only=False))
-    return np.asarray(array.to_numpy(zero_copy_only=False))
+        return numbers_from_arrow(array.flatten(), dtype).reshape((-1, column.size))
+    values = numbers_from_arrow(array, dtype)
+    if column.name == "t_sensor_ns" and array.null_count:
+        return np.where(nulls_from_arrow(array), NO_STAMP, values)
+    return values

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -10,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slamreplay.bundle.manifest import Loss
-from slamreplay.bundle.tables import Ragged
+from slamreplay.bundle.tables import Ragged, concatenated
 from slamreplay.errors import LogError
 from slamreplay.geometry.times import Times
 from slamreplay.ingest import DECODERS
@@ -65,9 +66,8 @@ class TopicRows:
 
     def frame(self, column: str = "frame_id") -> str:
         """The frame most rows have in a column, "" where there is none."""
-        names, counts = np.unique(self.columns.get(column, np.array([], str)).astype(str),
-                                  return_counts=True)  # fmt: skip
-        return str(names[np.argmax(counts)]) if len(names) else ""
+        counts = Counter(self.columns[column].tolist()) if column in self.columns else {}
+        return str(max(sorted(counts), key=counts.__getitem__)) if counts else ""
 
 
 def read_rows(
@@ -193,21 +193,10 @@ def _joined(parts: Sequence[TopicRows]) -> TopicRows:
     whole = replace(
         first,
         messages=sum(p.messages for p in parts),
-        columns={k: _concatenate([p.columns[k] for p in parts]) for k in first.columns},
+        columns={k: concatenated([p.columns[k] for p in parts]) for k in first.columns},
         t_sensor_ns=np.concatenate([p.t_sensor_ns for p in parts]),
         t_log_ns=np.concatenate([p.t_log_ns for p in parts]),
     )
     if (whole.t_log_ns[1:] >= whole.t_log_ns[:-1]).all():
         return whole
     return whole.take(np.argsort(whole.t_log_ns, kind="stable"))
-
-
-def _concatenate(columns: Iterable[Any]) -> Any:
-    columns = list(columns)
-    if len(columns) == 1:
-        return columns[0]
-    if not isinstance(columns[0], Ragged):
-        return np.concatenate(columns)
-    lengths = np.concatenate([c.lengths for c in columns])
-    offsets = np.concatenate([[0], np.cumsum(lengths)]).astype(np.int64)
-    return Ragged(np.concatenate([c.values for c in columns]), offsets)
