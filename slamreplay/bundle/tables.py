@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -23,6 +23,9 @@ from slamreplay.geometry.times import NO_STAMP
 
 if TYPE_CHECKING:
     import pandas as pd
+
+#: Bytes of a row group: what is held at once while a large table is written or read.
+GROUP_BYTES = 128_000_000
 
 _DTYPES: dict[str, Any] = {
     "int64": np.int64,
@@ -55,9 +58,19 @@ class Ragged:
         return self.values[self.offsets[row] : self.offsets[row + 1]]
 
     @property
+    def nbytes(self) -> int:
+        """Bytes in memory."""
+        return int(self.values.nbytes + self.offsets.nbytes)
+
+    @property
     def lengths(self) -> NDArray[np.int64]:
         """(N,) entries in each row."""
         return np.diff(self.offsets)
+
+    def rows(self, first: int, last: int) -> Ragged:
+        """The rows from `first` up to `last`, without a copy."""
+        begin, end = self.offsets[first], self.offsets[last]
+        return Ragged(self.values[begin:end], self.offsets[first : last + 1] - begin)
 
     def spread(self, numbers: NDArray[Any]) -> NDArray[Any]:
         """One number a row (N,) as one an entry; a single one where all rows have the same."""
@@ -74,6 +87,13 @@ class Ragged:
 
 
 ColumnData = NDArray[Any] | Ragged
+
+
+def group_bounds(rows: int, size: int) -> Iterator[range]:
+    """Ranges of rows of about `GROUP_BYTES`, of `size` bytes in all; one range at least."""
+    step = max(rows * GROUP_BYTES // max(size, 1), 1)
+    for start in range(0, max(rows, 1), step):
+        yield range(start, min(start + step, rows))
 
 
 def concatenated(columns: Sequence[Any]) -> Any:
@@ -151,6 +171,12 @@ class Table:
             return self
         return self.take(np.lexsort((self["t_log_ns"], self.t_ns)))
 
+    def groups(self) -> Iterator[Table]:
+        """The rows in parts of `GROUP_BYTES`, which are the row groups of the Parquet file."""
+        size = sum(data.nbytes for data in self._columns.values())
+        for rows in group_bounds(len(self), size):
+            yield self if len(rows) == len(self) else self.take(np.arange(rows.start, rows.stop))
+
     def to_arrow(self) -> pa.Table:
         """The Parquet form."""
         arrays = [_to_arrow(c, self._columns[c.name]) for c in self.schema.columns]
@@ -189,9 +215,9 @@ def _checked(column: Column, data: Any, table: str) -> ColumnData:
             return Ragged.of(data, dtype)
         return Ragged(np.asarray(data.values, dtype=dtype), np.asarray(data.offsets, np.int64))
     if column.kind == "str":
-        array = np.array(data, dtype=object)
+        array = np.asarray(data, dtype=object)
     else:
-        array = np.array(data, dtype=_DTYPES[column.kind])
+        array = np.asarray(data, dtype=_DTYPES[column.kind])
     if not len(array):
         array = array.reshape((0, column.size) if column.size else (0,))
     expected = (len(array), column.size) if column.size else (len(array),)
@@ -199,8 +225,9 @@ def _checked(column: Column, data: Any, table: str) -> ColumnData:
         raise BundleError(
             f"column '{column.name}' has shape {array.shape}, expected {expected}", where=table
         )
-    array.setflags(write=False)
-    return array
+    own = array.view()  # the caller's array stays as writable as it was
+    own.setflags(write=False)
+    return own
 
 
 def _to_arrow(column: Column, data: ColumnData) -> pa.Array:

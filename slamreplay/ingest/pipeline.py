@@ -5,12 +5,13 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from slamreplay.bundle.atomic import check_target
 from slamreplay.bundle.manifest import Frames, Loss, Manifest, Role, Source
 from slamreplay.bundle.store import MANIFEST, write_bundle
-from slamreplay.bundle.tables import Table
 from slamreplay.bundle.view import Bundle
+from slamreplay.ingest.assembly import Assembly
 from slamreplay.ingest.cast import settle_cast
 from slamreplay.ingest.clock import choose_clock, row_times
 from slamreplay.ingest.lasers import no_returns
@@ -49,6 +50,19 @@ def ingest(
         OutputError: the target is somebody else's, or cannot be written.
     """
     check_target(target, MANIFEST)
+    # Beside the target, for /tmp may be memory and what waits there is too large for it.
+    beside = next(folder for folder in target.absolute().parents if folder.exists())
+    with TemporaryDirectory(prefix=f".{target.name}.", dir=beside) as scratch:
+        return _ingest(logs, target, options, progress, Path(scratch))
+
+
+def _ingest(
+    logs: Sequence[Path],
+    target: Path,
+    options: IngestOptions,
+    progress: Callable[[str, float], None] | None,
+    scratch: Path,
+) -> Bundle:
     overrides = read_overrides(options.topics)
     with open_log(logs) as (readers, losses):
         sources = [s for reader in readers for s in reader.sources]
@@ -56,7 +70,8 @@ def ingest(
         names = [c.topic for c in connections]
         if options.robot is None and not overrides:
             refuse_mixture(connections)
-        topics, lost = read_rows(readers, topic_filter(names, options.robot), progress)
+        skip = topic_filter(names, options.robot)
+        topics, lost = read_rows(readers, skip, progress, scratch)
     if options.robot is not None:
         topics = [without_prefix(t, options.robot.strip("/")) for t in topics]
     check_topics(overrides, sorted({t.topic for t in topics}), options.topics)
@@ -132,7 +147,7 @@ def _roles(choices: Mapping[str, Choice]) -> list[Role]:
 
 
 def _present(
-    choices: Mapping[str, Choice], tables: Mapping[str, Table], frames: Frames
+    choices: Mapping[str, Choice], tables: Mapping[str, Assembly], frames: Frames
 ) -> set[str]:
     """The parts of a replay bundle that are there."""
     named = {"scan": "scans"}

@@ -60,7 +60,9 @@ class _Makers:
         s = (t - START) / SECOND
         cov = np.zeros(36)
         cov[[0, 7, 35]] = 1e-3 * s
-        twist = self.t["Twist"](self.vector(0.5 + self.rng.normal(0, 0.01), 0, 0), self.vector(0, 0, 0.1))
+        twist = self.t["Twist"](
+            self.vector(0.5 + self.rng.normal(0, 0.01), 0, 0), self.vector(0, 0, 0.1)
+        )
         return self.t["Odometry"](
             self.header(t, "odom"), "base_link",
             self.t["PoseWithCovariance"](self.pose(0.5 * s, np.sin(s), 0.1 * s), cov),
@@ -79,14 +81,18 @@ class _Makers:
         ranges[self.rng.integers(0, 1081, 30)] = np.inf
         step = np.float32(np.deg2rad(0.25))
         return self.t["LaserScan"](
-            self.header(t, "laser"), -540 * float(step), 540 * float(step), float(step), 0.0, 1 / 15,
-            0.05, 30.0, ranges, np.zeros(0, dtype=np.float32),
+            self.header(t, "laser"), -540 * float(step), 540 * float(step), float(step), 0.0,
+            1 / 15, 0.05, 30.0, ranges, np.zeros(0, dtype=np.float32),
         )  # fmt: skip
 
     def tf(self, t, parent, child):
         s = (t - START) / SECOND
-        transform = self.t["Transform"](self.vector(0.5 * s, np.sin(s), 0), self.quaternion(0.1 * s))
-        return self.t["TFMessage"]([self.t["TransformStamped"](self.header(t, parent), child, transform)])
+        transform = self.t["Transform"](
+            self.vector(0.5 * s, np.sin(s), 0), self.quaternion(0.1 * s)
+        )
+        return self.t["TFMessage"](
+            [self.t["TransformStamped"](self.header(t, parent), child, transform)]
+        )
 
     def costmap(self, t):
         info = self.t["MapMetaData"](self.stamp(t), 0.05, 60, 60, self.pose(0, 0, 0))
@@ -95,7 +101,9 @@ class _Makers:
 
     def tree(self, t):
         names = ["NavigateRecovery", "FollowPath", "Spin"]
-        events = [self.t["BehaviorTreeStatusChange"](self.stamp(t), n, "IDLE", "RUNNING") for n in names]
+        events = [
+            self.t["BehaviorTreeStatusChange"](self.stamp(t), n, "IDLE", "RUNNING") for n in names
+        ]
         return self.t["BehaviorTreeLog"](self.stamp(t), events)
 
     def joints(self, t):
@@ -169,7 +177,9 @@ def _bag(path, log, ros, compression):
 
     writer = Writer(path)
     if compression != "none":
-        writer.set_compression({"lz4": Writer.CompressionFormat.LZ4, "bz2": Writer.CompressionFormat.BZ2}[compression])
+        writer.set_compression(
+            {"lz4": Writer.CompressionFormat.LZ4, "bz2": Writer.CompressionFormat.BZ2}[compression]
+        )
     _rosbags(writer, log, store(ros))
 
 

@@ -103,7 +103,9 @@ def _columns(kind, rows):
     columns = list(zip(*rows, strict=True))
     if ragged:
         columns[-1] = [np.concatenate(columns[-1])]
-    return [np.array(c) if not isinstance(c[0], str) else np.array(c, dtype=object) for c in columns]
+    return [
+        np.array(c) if not isinstance(c[0], str) else np.array(c, dtype=object) for c in columns
+    ]
 
 
 def _gather(stream):
@@ -191,7 +193,8 @@ def main():
     for name, how, peer, goal, least in CASES:
         path = log_of(name, how)
         cpu, wall, own, theirs = ratios(path, peer)
-        print(f"| {name} | {peer} | {goal} | {least} | {cpu:.1f} | {wall:.1f} | {own:.2f} | {theirs:.2f} |", flush=True)
+        numbers = f"{cpu:.1f} | {wall:.1f} | {own:.2f} | {theirs:.2f}"
+        print(f"| {name} | {peer} | {goal} | {least} | {numbers} |", flush=True)
 
 
 if __name__ == "__main__":
