@@ -9,9 +9,11 @@ from typing import Any
 #: A chunk that claims to be larger than this is damaged: recorders close theirs after megabytes.
 MAX_CHUNK_BYTES = 2_000_000_000
 _PIECE = 65536
+#: Slices of a memoryview are not copied.
+Bytes = bytes | memoryview
 
 
-def decompress(data: bytes, codec: str, size: int) -> bytes:
+def decompress(data: Bytes, codec: str, size: int) -> Bytes:
     """The content of a chunk.
 
     Args:
@@ -25,12 +27,13 @@ def decompress(data: bytes, codec: str, size: int) -> bytes:
     if not 0 <= size <= MAX_CHUNK_BYTES:
         raise ValueError(f"it claims to hold {size} bytes")
     try:
+        content: Bytes
         if codec in ("", "none"):
             content = data
         elif codec == "bz2":
             content = bz2.decompress(data)
         elif codec in ("zstd", "lz4"):
-            content = _arrow(codec).decompress(data, decompressed_size=size, asbytes=True)
+            content = memoryview(_arrow(codec).decompress(data, decompressed_size=size))
         else:
             raise ValueError(f"unknown compression '{codec}'")
     except (OSError, EOFError) as error:  # pyarrow's errors are OSErrors
@@ -40,7 +43,7 @@ def decompress(data: bytes, codec: str, size: int) -> bytes:
     return content
 
 
-def decompress_start(data: bytes, codec: str) -> bytes:
+def decompress_start(data: Bytes, codec: str) -> Bytes:
     """As much of a cut chunk's content as its first bytes give; nothing of an unknown codec."""
     if codec in ("", "none"):
         return data

@@ -15,7 +15,7 @@ import numpy as np
 from slamreplay.bundle.manifest import Loss, Source
 from slamreplay.errors import LogError
 from slamreplay.ingest.readers import mcap_records as m
-from slamreplay.ingest.readers.compression import decompress
+from slamreplay.ingest.readers.compression import Bytes, decompress
 from slamreplay.ingest.readers.damage import Damage
 from slamreplay.ingest.readers.mcap_scan import Contents, cut_content, from_scan, from_summary
 from slamreplay.ingest.readers.positioned import read_at
@@ -154,7 +154,7 @@ class McapReader:
 
 def _load(stream: BinaryIO, chunk: m.ChunkIndex, table: np.ndarray) -> _Chunk:
     """Read, decompress and check one chunk; called in threads."""
-    raw = read_at(stream, chunk.start, chunk.length + chunk.index_length)
+    raw = memoryview(read_at(stream, chunk.start, chunk.length + chunk.index_length))
     try:
         opcode, length = struct.unpack_from("<BQ", raw)
         if opcode != m.CHUNK or m.HEAD + length != chunk.length:
@@ -176,7 +176,7 @@ def _load(stream: BinaryIO, chunk: m.ChunkIndex, table: np.ndarray) -> _Chunk:
     return _Chunk(chunk, compact(block), is_index_wrong=is_index_wrong)
 
 
-def _by_index(content: bytes, index: bytes, table: np.ndarray) -> Block | None:
+def _by_index(content: Bytes, index: Bytes, table: np.ndarray) -> Block | None:
     """Messages where the chunk's index records put them; None where these are wrong."""
     data = np.frombuffer(content, dtype=np.uint8)
     places = []
@@ -209,7 +209,7 @@ def _by_places(data: np.ndarray, at: np.ndarray, table: np.ndarray) -> Block | N
     return Block(data, connection[keep], at + whole, ends, t_log_ns)
 
 
-def _by_walking(content: bytes, table: np.ndarray) -> Block:
+def _by_walking(content: Bytes, table: np.ndarray) -> Block:
     """Wanted messages of a chunk's content, record by record, as far as they are whole."""
     found = []
     head = struct.Struct("<HIQ").unpack_from

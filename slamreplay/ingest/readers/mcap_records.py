@@ -9,6 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from slamreplay.ingest.readers.compression import Bytes
+
 MAGIC = b"\x89MCAP0\r\n"
 FOOTER, SCHEMA, CHANNEL, MESSAGE, CHUNK, MESSAGE_INDEX, CHUNK_INDEX = 2, 3, 4, 5, 6, 7, 8
 STATISTICS, DATA_END = 0x0B, 0x0F
@@ -60,7 +62,7 @@ class ChunkIndex:
     channels: frozenset[int] | None
 
 
-def records(data: bytes, at: int = 0) -> Iterator[tuple[int, int, int]]:
+def records(data: Bytes, at: int = 0) -> Iterator[tuple[int, int, int]]:
     """Opcode, first and one past the last byte of every whole record; ends where none fits."""
     end = len(data)
     unpack = struct.Struct("<BQ").unpack_from
@@ -73,16 +75,16 @@ def records(data: bytes, at: int = 0) -> Iterator[tuple[int, int, int]]:
         yield opcode, begin, at
 
 
-def schema(data: bytes) -> tuple[int, Schema]:
+def schema(data: Bytes) -> tuple[int, Schema]:
     """Id and schema. Raises ValueError, struct.error where the record is none."""
     (number,) = struct.unpack_from("<H", data)
     name, at = _text(data, 2)
     encoding, at = _text(data, at)
     (length,) = struct.unpack_from("<I", data, at)
-    return number, Schema(name, encoding, data[at + 4 : at + 4 + length])
+    return number, Schema(name, encoding, bytes(data[at + 4 : at + 4 + length]))
 
 
-def channel(data: bytes) -> tuple[int, Channel]:
+def channel(data: Bytes) -> tuple[int, Channel]:
     """Id and channel. Raises ValueError, struct.error where the record is none."""
     number, own = struct.unpack_from("<HH", data)
     topic, at = _text(data, 4)
@@ -90,7 +92,7 @@ def channel(data: bytes) -> tuple[int, Channel]:
     return number, Channel(own, topic, encoding)
 
 
-def chunk_head(data: bytes) -> ChunkHead:
+def chunk_head(data: Bytes) -> ChunkHead:
     """Of the first bytes of a chunk. Raises ValueError, struct.error where it is none."""
     _, _, size, crc = struct.unpack_from("<QQQI", data)
     compression, at = _text(data, 28)
@@ -117,16 +119,16 @@ def statistics(data: bytes) -> tuple[int, int, dict[int, int]]:
     return messages, chunks, dict(zip(flat[::2], flat[1::2], strict=True))
 
 
-def message_index(data: bytes) -> tuple[int, NDArray[np.int64]]:
+def message_index(data: Bytes) -> tuple[int, NDArray[np.int64]]:
     """Channel, and (N,) offsets of its messages in the chunk's content."""
     number, size = struct.unpack_from("<HI", data)
     entries = np.frombuffer(data, dtype="<u8", count=size // 8, offset=6)
     return int(number), entries[1::2].astype(np.int64)
 
 
-def _text(data: bytes, at: int) -> tuple[str, int]:
+def _text(data: Bytes, at: int) -> tuple[str, int]:
     (length,) = struct.unpack_from("<I", data, at)
     begin = at + 4
     if begin + length > len(data):
         raise ValueError("a text is longer than its record")
-    return data[begin : begin + length].decode("utf-8", "replace"), begin + length
+    return bytes(data[begin : begin + length]).decode("utf-8", "replace"), begin + length

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from slamreplay.ingest.readers import mcap_records as m
-from slamreplay.ingest.readers.compression import decompress, decompress_start
+from slamreplay.ingest.readers.compression import Bytes, decompress, decompress_start
 from slamreplay.ingest.readers.damage import Damage
 
 _STEP = 4_000_000
@@ -45,7 +45,7 @@ class Contents:
     loose: list[tuple[int, int]] = field(default_factory=list)
     cut: int | None = None
 
-    def learn(self, opcode: int, record: bytes) -> None:
+    def learn(self, opcode: int, record: Bytes) -> None:
         """A schema or channel; the first of a number counts, a broken one does not."""
         try:
             if opcode == m.SCHEMA:
@@ -157,7 +157,7 @@ def _take(contents: Contents, stream: BinaryIO, opcode: int, at: int, end: int) 
             contents.chunks.append(m.ChunkIndex(at, end - at, 0, 0, None))
 
 
-def _count(contents: Contents, content: bytes) -> None:
+def _count(contents: Contents, content: Bytes) -> None:
     for opcode, begin, end in m.records(content):
         if opcode == m.MESSAGE and end - begin >= m.MESSAGE_HEAD:
             contents.counts[struct.unpack_from("<H", content, begin)[0]] += 1
@@ -165,13 +165,13 @@ def _count(contents: Contents, content: bytes) -> None:
             contents.learn(opcode, content[begin:end])
 
 
-def cut_content(path: Path, at: int) -> bytes:
+def cut_content(path: Path, at: int) -> Bytes:
     """As much of the content of the chunk that begins at `at` as the file still has."""
     with path.open("rb") as stream:
         return _cut_content(stream, at, path.stat().st_size)
 
 
-def _cut_content(stream: BinaryIO, at: int, size: int) -> bytes:
+def _cut_content(stream: BinaryIO, at: int, size: int) -> Bytes:
     stream.seek(at + m.HEAD)
     record = stream.read(size - at - m.HEAD)
     try:

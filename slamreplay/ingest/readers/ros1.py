@@ -14,7 +14,7 @@ from slamreplay.bundle.manifest import Loss, Source
 from slamreplay.errors import LogError
 from slamreplay.geometry.times import NS_PER_S
 from slamreplay.ingest.readers import ros1_records as r
-from slamreplay.ingest.readers.compression import decompress
+from slamreplay.ingest.readers.compression import Bytes, decompress
 from slamreplay.ingest.readers.damage import Damage
 from slamreplay.ingest.readers.positioned import read_at
 from slamreplay.ingest.readers.reader import Block
@@ -123,7 +123,7 @@ class Ros1Reader:
 
 def _load(stream: BinaryIO, chunk: Chunk, table: np.ndarray) -> _Loaded:
     """Read and decompress one chunk; called in threads."""
-    raw = read_at(stream, chunk.start, chunk.end - chunk.start)
+    raw = memoryview(read_at(stream, chunk.start, chunk.end - chunk.start))
     codec = "none"
     try:
         begin = 4 + r.u32(raw)
@@ -144,7 +144,7 @@ def _load(stream: BinaryIO, chunk: Chunk, table: np.ndarray) -> _Loaded:
     return _Loaded(chunk, compact(block), is_index_wrong=end < len(raw))
 
 
-def _by_index(content: bytes, index: bytes, table: np.ndarray) -> Block | None:
+def _by_index(content: Bytes, index: Bytes, table: np.ndarray) -> Block | None:
     """Wanted messages where the chunk's index records put them; None where these are wrong."""
     data = np.frombuffer(content, dtype=np.uint8)
     found = []
@@ -205,7 +205,7 @@ def _messages(data: np.ndarray, at: np.ndarray, number: int) -> Block | None:
     return Block(data, np.zeros(len(at), dtype=np.int64), start, start + sizes, t_log_ns)
 
 
-def _by_walking(content: bytes, table: np.ndarray) -> tuple[Block, str]:
+def _by_walking(content: Bytes, table: np.ndarray) -> tuple[Block, str]:
     """Wanted messages record by record, and what ended the walk before the content did."""
     found = []
     problem = ""

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slamreplay.geometry.times import NS_PER_S
+from slamreplay.ingest.readers.compression import Bytes
 
 MAGIC = b"#ROSBAG V2.0\n"
 MESSAGE, BAG, INDEX, CHUNK, CHUNK_INFO, CONNECTION = 2, 3, 4, 5, 6, 7
@@ -29,19 +30,19 @@ _SIZES: dict[int, dict[bytes, int]] = {
 Header = Mapping[bytes, bytes]
 
 
-def u32(data: bytes, at: int = 0) -> int:
+def u32(data: Bytes, at: int = 0) -> int:
     """Raises struct.error where there are no four bytes."""
     return int(struct.unpack_from("<I", data, at)[0])
 
 
-def fields(data: bytes) -> dict[bytes, bytes]:
+def fields(data: Bytes) -> dict[bytes, bytes]:
     """Header fields by name. Raises ValueError, struct.error where they are none."""
     out, at = {}, 0
     while at < len(data):
         end = at + 4 + u32(data, at)
         if end > len(data):
             raise ValueError("a field is longer than its header")
-        name, found, value = data[at + 4 : end].partition(b"=")
+        name, found, value = bytes(data[at + 4 : end]).partition(b"=")
         if not found:
             raise ValueError("a header field without '='")
         out[name] = value
@@ -59,7 +60,7 @@ def opcode(header: Header) -> int:
     return op[0]
 
 
-def records(data: bytes) -> Iterator[tuple[dict[bytes, bytes], int, int]]:
+def records(data: Bytes) -> Iterator[tuple[dict[bytes, bytes], int, int]]:
     """Header, first and one past the last byte of the data of every record of a chunk.
 
     Raises:
@@ -85,7 +86,7 @@ def stamp_ns(data: bytes) -> int:
     return int(sec) * NS_PER_S + int(nsec)
 
 
-def index_offsets(data: bytes, count: int) -> NDArray[np.int64]:
+def index_offsets(data: Bytes, count: int) -> NDArray[np.int64]:
     """(N,) offsets of messages in the chunk's content, of an index record of version 1."""
     entries = np.frombuffer(data, dtype=[("time", "<u8"), ("at", "<u4")], count=count)
     return entries["at"].astype(np.int64)

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from slamreplay.ingest.readers import ros1_records as r
-from slamreplay.ingest.readers.compression import decompress, decompress_start
+from slamreplay.ingest.readers.compression import Bytes, decompress, decompress_start
 from slamreplay.ingest.readers.damage import Damage
 from slamreplay.ingest.readers.reader import Connection, normalise_type
 
@@ -49,7 +49,7 @@ class Contents:
     chunks: list[Chunk] = field(default_factory=list)
     cut: int | None = None
 
-    def learn(self, header: r.Header, data: bytes) -> None:
+    def learn(self, header: r.Header, data: Bytes) -> None:
         """A connection record; the first of a number counts."""
         number = r.u32(header[b"conn"])
         if number in self.connections:
@@ -151,7 +151,7 @@ def _take(contents: Contents, header: r.Header, data: bytes, at: int, end: int) 
         contents.chunks[-1] = Chunk(last.start, end, last.size)
 
 
-def _count(contents: Contents, content: bytes) -> None:
+def _count(contents: Contents, content: Bytes) -> None:
     try:
         for header, begin, end in r.records(content):
             kind = r.opcode(header)
@@ -168,7 +168,7 @@ def codec_of(header: r.Header) -> str:
     return header.get(b"compression", b"none").decode("ascii", "replace")
 
 
-def cut_content(path: Path, at: int) -> bytes:
+def cut_content(path: Path, at: int) -> Bytes:
     """As much of the content of the chunk that begins at `at` as the file still has.
 
     Empty where no chunk begins there, or where the file does not end in it.
