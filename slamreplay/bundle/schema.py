@@ -212,7 +212,15 @@ _SCHEMAS = (
         _FRAME,
         _CHILD,
         Column("kind", "str", doc="simulation, motion_capture, survey, gnss, fiducial or dock"),
-        *_POSE,
+        _POSE[0],
+        Column(
+            "orientation_xyzw",
+            "float64",
+            4,
+            "1",
+            "frame_id",
+            "unit quaternion; NaN where the sensor tells where and not how turned",
+        ),
         _POSE_COV,
     ),
     _table(
