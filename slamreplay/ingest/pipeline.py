@@ -26,6 +26,7 @@ from slamreplay.ingest.roles import Choice
 from slamreplay.ingest.rows import TopicRows, read_rows
 from slamreplay.ingest.span import clock_between, cut, evidence_span
 from slamreplay.ingest.tables import build, without_prefix
+from slamreplay.ingest.text_logs import read_text_log
 
 
 def ingest(
@@ -38,7 +39,8 @@ def ingest(
     """Read a log (one container or several files of one log) into the bundle at `target`.
 
     Args:
-        logs: .bag, .mcap, .db3 files or folders of rosbag2; several are one log.
+        logs: .bag, .mcap, .db3 files or folders of rosbag2, several being one log; or one CARMEN
+            file or MRCLAM folder.
         target: the bundle's folder; the same content there already is kept as it is.
         options: what the user says about the log.
         progress: told a few words and the share done, 0 to 1.
@@ -64,20 +66,25 @@ def _ingest(
     scratch: Path,
 ) -> Bundle:
     overrides = read_overrides(options.topics)
-    with open_log(logs) as (readers, losses):
-        sources = [s for reader in readers for s in reader.sources]
-        connections = [c for reader in readers for c in reader.connections]
-        names = [c.topic for c in connections]
-        if options.robot is None and not overrides:
-            refuse_mixture(connections)
-        skip = topic_filter(names, options.robot)
-        topics, lost = read_rows(readers, skip, progress, scratch)
+    text = read_text_log(logs, options.robot)
+    if text is not None:
+        sources, topics, losses = list(text.sources), text.topics, text.losses
+    else:
+        with open_log(logs) as (readers, losses):
+            sources = [s for reader in readers for s in reader.sources]
+            connections = [c for reader in readers for c in reader.connections]
+            names = [c.topic for c in connections]
+            if options.robot is None and not overrides:
+                refuse_mixture(connections)
+            skip = topic_filter(names, options.robot)
+            topics, lost = read_rows(readers, skip, progress, scratch)
+        losses = [*losses, *lost]
     if options.robot is not None:
         topics = [without_prefix(t, options.robot.strip("/")) for t in topics]
     check_topics(overrides, sorted({t.topic for t in topics}), options.topics)
     cast = settle_cast(topics, overrides)
     layers = lay_out(cast, options.map)
-    losses = [*losses, *lost, *cast.losses, *layers.losses, *no_returns(cast.topics)]
+    losses = [*losses, *cast.losses, *layers.losses, *no_returns(cast.topics)]
     sources += layers.sources
 
     clock = choose_clock(cast.topics)

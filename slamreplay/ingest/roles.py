@@ -9,6 +9,7 @@ import numpy as np
 
 from slamreplay.bundle.manifest import Frames
 from slamreplay.bundle.no_return import told_as_range_max
+from slamreplay.bundle.schema import JUDGING_KINDS
 from slamreplay.ingest.names import (
     basename,
     is_gnss,
@@ -54,6 +55,7 @@ def is_costmap(topic: TopicRows) -> bool:
 def choose_reference(topics: Sequence[TopicRows]) -> Choice | None:
     """An independent idea of the truth, which only judges."""
     found = [t for t in topics if t.table in ("poses", "odometry") and is_reference(t.topic)]
+    found += [t for t in topics if t.table == "references" and _judges(t)]
     return _pick(found, lambda t: (t.messages,), "named as a reference", "most messages")
 
 
@@ -72,7 +74,9 @@ def choose_odometry(topics: Sequence[TopicRows], tf: Sequence[TopicRows]) -> Cho
         on_tf = (t.frame(), t.frame("child_frame_id")) in edges
         return (on_tf, is_odom_frame(t.frame()), "odom" in tokens(t.topic), t.messages)
 
-    return _pick(found, rank, "nav_msgs/Odometry", "its frames are those of tf, then by name")
+    kinds = {_spoken(t) for t in found}
+    what = kinds.pop() if len(kinds) == 1 else "odometry"
+    return _pick(found, rank, what, "its frames are those of tf, then by name")
 
 
 def choose_imu(topics: Sequence[TopicRows]) -> Choice | None:
@@ -91,7 +95,7 @@ def choose_scan(topics: Sequence[TopicRows]) -> Choice | None:
     if not found:
         return None
     if len(found) == 1:
-        return Choice(found[0], "sensor_msgs/LaserScan, the only one")
+        return Choice(found[0], f"{_spoken(found[0])}, the only one")
     beams = {id(t): valid_beams(t) for t in found}
     most = max(beams.values())
     close = [t for t in found if beams[id(t)] >= 0.9 * most]
@@ -208,6 +212,15 @@ def is_estimate(topic: TopicRows, frames: Frames) -> bool:
     if topic.table != "poses" or is_odom_frame(topic.frame()):
         return False
     return in_map and (bool(words & _BELIEF) or topic.type.endswith("WithCovarianceStamped"))
+
+
+def _spoken(topic: TopicRows) -> str:
+    """A type as people say it: "nav_msgs/Odometry", "carmen/ODOM"."""
+    return topic.type.replace("/msg/", "/")
+
+
+def _judges(topic: TopicRows) -> bool:
+    return bool(len(topic)) and set(topic.columns["kind"]) <= JUDGING_KINDS
 
 
 def _correction(topics: Sequence[TopicRows], frames: Frames) -> TopicRows | None:
