@@ -1,4 +1,4 @@
-"""Logs as lines of text, told by their content: CARMEN files.
+"""Logs as lines of text: CARMEN files and MRCLAM folders, told by their content.
 
 They hold no messages that a decoder could be given, so each format is read whole, straight into
 rows of the bundle's tables.
@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from slamreplay.errors import UsageError
+from slamreplay.errors import LogError, UsageError
 
 if TYPE_CHECKING:
     from slamreplay.ingest.text_logs.log import TextLog
@@ -19,12 +19,23 @@ __all__ = ["read_text_log", "text_log"]
 
 
 def text_log(path: Path) -> Callable[[Path, str | None], TextLog] | None:
-    """What reads a path (given the robot's name), or None where it is no text log."""
+    """What reads a path (given the robot's name), or None where it is no text log.
+
+    Raises:
+        LogError: one file of an MRCLAM folder.
+    """
     from slamreplay.ingest.text_logs.carmen import read_carmen
     from slamreplay.ingest.text_logs.carmen_lines import is_carmen
     from slamreplay.ingest.text_logs.lines import head_of
+    from slamreplay.ingest.text_logs.mrclam import read_mrclam, robots_of
 
-    return read_carmen if is_carmen(head_of(path)) else None
+    if path.is_dir():
+        return read_mrclam if robots_of(path) else None
+    head = head_of(path)
+    if head.startswith(b"# UTIAS Multi-Robot"):
+        hint = "give the folder it lies in, and --robot"
+        raise LogError("one file of an MRCLAM folder is no log", where=path, hint=hint)
+    return read_carmen if is_carmen(head) else None
 
 
 def read_text_log(paths: Sequence[Path], robot: str | None) -> TextLog | None:
