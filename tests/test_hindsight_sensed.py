@@ -285,6 +285,14 @@ def seen_by(keys, xyyaw, surveyed=(np.nan, np.nan, np.nan)):
     )  # fmt: skip
 
 
+def test_a_surveyed_point_is_a_known_landmark_without_a_heading():
+    seen = seen_by([0, 1], [[2.0, 1.0, np.nan]] * 2, (4.0, 3.0, np.nan))
+    landmarks, _ = seen.constraints(np.zeros((2, 3)))
+
+    assert landmarks.known.tolist() == [True]
+    np.testing.assert_array_equal(landmarks.initial, [[4.0, 3.0, np.nan]])
+
+
 CARRIED = (np.tile([30.0, 30.0, 0.0], (2, 1)), np.full(2, 8.0))
 AISLES = [[0.0, 5.0, 0.0], [0.0, 0.0, 0.0]]
 

@@ -14,12 +14,16 @@ from slamreplay.bundle.scans import scan_set
 from slamreplay.bundle.tables import Ragged
 from slamreplay.errors import LogError, UsageError
 from slamreplay.geometry import se2, se3
+from slamreplay.hindsight.pipeline import hindsight
 from slamreplay.ingest.options import IngestOptions
 from slamreplay.ingest.pipeline import ingest
 from slamreplay.ingest.text_logs import text_log
 from slamreplay.ingest.text_logs.carmen import read_carmen
 from slamreplay.ingest.text_logs.no_return_code import no_return_code
+from slamreplay.maps.map_server import map_files
+from slamreplay.maps.raycast import cast_rays
 from slamreplay.postmortem import postmortem
+from slamreplay.testing.synthetic import room_grid, true_path
 
 IPC = 976_052_857.0
 
@@ -375,6 +379,31 @@ def test_no_return_is_free_space_and_no_wall(tmp_path):
     np.testing.assert_array_equal(lasers.misses, nothing)
     assert lasers.ranges_m[lasers.hits].max() < 9.1
     assert not lasers.hits[5, 7]
+
+
+def test_hindsight_lays_a_carmen_log_onto_its_map(tmp_path):
+    """Bearings, the laser's place and beams without a return have to be right for that."""
+    rng = np.random.Generator(np.random.PCG64(4))
+    mount, t = np.array([0.2, -0.1, 0.1]), np.arange(0.0, 20.0, 0.1)
+    truth = true_path(t)
+    steps = se2.between(truth[:-1], truth[1:]) * [1.02, 1.0, 0.98]
+    wheels = [np.zeros(3)]
+    for step in steps:
+        wheels.append(se2.compose(wheels[-1], step))
+    bearings = np.radians(np.arange(180) - 90.0)
+    ranges = cast_rays(room_grid(), se2.compose(truth, mount), bearings, 8.0)
+    ranges = np.where(ranges < 8.0, ranges + rng.normal(0.0, 0.01, ranges.shape), 81.83)
+    lines = []
+    for k, pose in enumerate(wheels):
+        lines += [odom(t[k], pose), flaser(t[k], ranges[k], pose, se2.compose(pose, mount))]
+    for name, content in map_files(room_grid(), "map").items():
+        (tmp_path / name).write_bytes(content)
+    options = IngestOptions(map=tmp_path / "map.yaml")
+    found = hindsight(ingest([write(tmp_path / "a.clf", lines)], tmp_path / "b", options).view())
+
+    missed = se2.between(found.track.xyyaw, truth)
+    assert np.percentile(np.hypot(missed[:, 0], missed[:, 1]), 95) < 0.06
+    assert np.percentile(np.abs(missed[:, 2]), 95) < np.radians(0.6)
 
 
 NUMBER = st.floats(-1e4, 1e4).map(lambda v: round(v, 6))
