@@ -32,7 +32,7 @@ def check(context: CheckContext) -> tuple[Finding, ...]:
     n = len(offsets)
     if abs(median) > EPOCH_S:
         why = "stamps of another epoch (simulated time, or a log that was replayed)"
-        if 0 <= clock.knots[0][0] < RELATIVE_NS:
+        if median < 0.0 and 0 <= clock.knots[0][0] < RELATIVE_NS:
             why = "log times count from when the recorder was started"
         text = f"{numbers}: {why}"
         return (Finding("SR-CLK-001", "info", text, start, end, value=median, unit="s", n=n),)
