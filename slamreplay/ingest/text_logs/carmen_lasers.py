@@ -112,9 +112,9 @@ def _columns(group: Group, params: Mapping[str, str], number: int) -> dict[str, 
         step = np.where(step == 0.0, fov / max(layout.readings - 1, 1), step)
         limit = np.where(limit > 0.0, limit, MAX_M)
     else:
-        first, between = _angles(layout.readings, _param(params, number, _RESOLUTION))
+        first, between = _angles(layout.readings, _param(params, _RESOLUTION.get(number, ())))
         start, step = np.full(n, first), np.full(n, between)
-        stated = _param(params, number, _LIMIT)
+        stated = _param(params, _LIMIT.get(number, ()))
         limit = np.full(n, stated if stated is not None and stated > 0.0 else MAX_M)
     tail = fields[:, layout.tail :]
     tail = np.hstack([tail, np.full((n, 8 - min(tail.shape[1], 8)), np.nan)])
@@ -135,22 +135,16 @@ def _angles(readings: int, resolution_deg: float | None) -> tuple[float, float]:
     return float(np.radians(start)), float(np.radians(step))
 
 
-#: Names of PARAM by laser. Rear lasers are placed by one only where its angle is told: the sign of
-#: the offset along a laser that looks back differs between versions.
+#: Names of PARAM by laser.
 _RESOLUTION = {1: ("laser_front_laser_resolution",), 2: ("laser_rear_laser_resolution",)}
 _LIMIT = {1: ("robot_front_laser_max", "simulator_frontlaser_maxrange"),
           2: ("robot_rear_laser_max", "simulator_rearlaser_maxrange")}  # fmt: skip
-_OFFSETS = {
-    number: tuple((f"robot_{side}laser_{what}",) for what in
-                  ("offset", "side_offset", "angular_offset"))
-    for number, side in ((1, "front"), (2, "rear"))
-}  # fmt: skip
+_SIDES = {1: "robot_frontlaser", 2: "robot_rearlaser"}
 
 
-def _param(
-    params: Mapping[str, str], number: int, names: Mapping[int, Sequence[str]]
-) -> float | None:
-    for name in names.get(number, ()):
+def _param(params: Mapping[str, str], names: Sequence[str]) -> float | None:
+    """The first of these parameters that is a number."""
+    for name in names:
         try:
             value = float(params.get(name, ""))
         except ValueError:
@@ -161,10 +155,17 @@ def _param(
 
 
 def _mount_of_params(params: Mapping[str, str], number: int) -> se2.Array | None:
-    found = [_param(params, number, {number: n}) for n in _OFFSETS.get(number, ())]
-    if not found or found[0] is None or (number != 1 and found[2] is None):
+    """Where PARAM puts a laser on the robot.
+
+    A rear laser is placed only where its angle is told: without one, versions of CARMEN differ in
+    which way they count the offset of a laser that looks back.
+    """
+    side = _SIDES.get(number, "")
+    names = (f"{side}_offset", f"{side}_side_offset", f"{side}_angular_offset")
+    x, y, yaw = (_param(params, (name,)) for name in names)
+    if x is None or (number != 1 and yaw is None):
         return None
-    return np.array([value or 0.0 for value in found])
+    return np.array([x, y or 0.0, yaw or 0.0])
 
 
 def _mount(
