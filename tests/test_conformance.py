@@ -78,6 +78,16 @@ DECODER_LINES = {
         {"ranges_m": [1, np.inf, 0], "angle_min_rad": -1, "range_max_m": 9},
         T,
     ),
+    "sensor_msgs/msg/MultiEchoLaserScan": (
+        {"header": HEADER, **SCAN, "ranges": [{"echoes": [2.0, 3.0]}, {"echoes": []}]},
+        {"ranges_m": [2, np.nan], "angle_min_rad": -1, "frame_id": "f"},
+        T,
+    ),
+    "sensor_msgs/msg/PointCloud": (
+        {"header": HEADER, "points": [XYZ], "channels": []},
+        {"points_xyz": [1, 2, 3], "frame_id": "f"},
+        T,
+    ),
     "sensor_msgs/msg/PointCloud2": (
         {"header": HEADER, **CLOUD, "row_step": 12, "data": XYZ_BYTES},
         {"points_xyz": [1, 2, 3]},

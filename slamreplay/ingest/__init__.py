@@ -21,6 +21,10 @@ DECODERS = Registry(
         "nav_msgs/msg/Odometry": f"{_HERE}.odometry:ODOMETRY",
         "sensor_msgs/msg/Imu": f"{_HERE}.imu:IMU",
         "sensor_msgs/msg/LaserScan": f"{_HERE}.laser_scan:LASER_SCAN",
+        "sensor_msgs/msg/MultiEchoLaserScan": (
+            f"{_HERE}.multi_echo_laser_scan:MULTI_ECHO_LASER_SCAN"
+        ),
+        "sensor_msgs/msg/PointCloud": f"{_HERE}.point_cloud_ros1:POINT_CLOUD_ROS1",
         "sensor_msgs/msg/PointCloud2": f"{_HERE}.point_cloud:POINT_CLOUD",
         "geometry_msgs/msg/PoseWithCovarianceStamped": f"{_HERE}.pose:POSE_WITH_COVARIANCE",
         "geometry_msgs/msg/PoseStamped": f"{_HERE}.pose:POSE",

@@ -190,6 +190,11 @@ def choose_command(topics: Sequence[TopicRows]) -> Choice | None:
     return choose_simple(found, "commands", "velocity command", ("cmd_vel", "command"))
 
 
+def type_name(kind: str) -> str:
+    """A message type as people write it: "sensor_msgs/LaserScan"."""
+    return kind.replace("/msg/", "/")
+
+
 def _pick(found: Sequence[TopicRows], rank: Rank, what: str, order: str) -> Choice | None:
     if not found:
         return None
