@@ -55,6 +55,8 @@ IMU = {"orientation": TURN, "angular_velocity": XYZ, "linear_acceleration": XYZ}
 IMU_COV = {f"{name}_covariance": COV9 for name in IMU}
 ERRORS = {"image_error": 0.1, "object_error": 0.1, "fiducial_area": 9.0}
 VELOCITY = {"linear_velocity_xyz": [1, 2, 3], "angular_velocity_xyz": [4, 5, 6]}
+DRIVE = {"speed": 1.5, "steering_angle": 0.2}
+DRIVEN = {"linear_velocity_xyz": [1.5, 0, 0], "angular_velocity_xyz": [0, 0, np.nan]}
 
 #: Message type: the fields of one message, what its first row holds, and its stamp.
 DECODER_LINES = {
@@ -168,7 +170,18 @@ DECODER_LINES = {
         T,
     ),
     "geometry_msgs/msg/Twist": (TWIST, VELOCITY, None),
-    "geometry_msgs/msg/TwistStamped": ({"header": HEADER, "twist": TWIST}, VELOCITY, T),
+    "geometry_msgs/msg/TwistStamped": (
+        {"header": HEADER, "twist": TWIST},
+        {**VELOCITY, "frame_id": "f", "twist_covariance": [np.nan] * 36},
+        T,
+    ),
+    "geometry_msgs/msg/TwistWithCovarianceStamped": (
+        {"header": HEADER, "twist": {"twist": TWIST, "covariance": COV36}},
+        {**VELOCITY, "frame_id": "f", "twist_covariance": COV36},
+        T,
+    ),
+    "ackermann_msgs/msg/AckermannDrive": (DRIVE, DRIVEN, None),
+    "ackermann_msgs/msg/AckermannDriveStamped": ({"header": HEADER, "drive": DRIVE}, DRIVEN, T),
     "nav2_msgs/msg/BehaviorTreeLog": (
         {"timestamp": STAMP, "event_log": [SPIN]},
         {"name": "Spin", "status": "running", "source": "behavior_tree"},

@@ -197,7 +197,22 @@ _SCHEMAS = (
         "commands",
         "velocity commands",
         Column("linear_velocity_xyz", "float64", 3, "m/s", "base", "commanded"),
-        Column("angular_velocity_xyz", "float64", 3, "rad/s", "base", "commanded"),
+        Column(
+            "angular_velocity_xyz",
+            "float64",
+            3,
+            "rad/s",
+            "base",
+            "commanded; NaN where it is not told (a steering angle)",
+        ),
+    ),
+    _table(
+        "velocities",
+        "measured velocities that come without a pose",
+        _FRAME,
+        Column("linear_velocity_xyz", "float64", 3, "m/s", "frame_id", "velocity"),
+        Column("angular_velocity_xyz", "float64", 3, "rad/s", "frame_id", "turn rate"),
+        _covariance("twist_covariance", 36, "frame_id", "6x6 row-major"),
     ),
     _table(
         "recoveries",

@@ -171,6 +171,7 @@ ROLE_TABLES = {
     "costmap": "costmaps",
     "plan": "plans",
     "command": "commands",
+    "velocity": "velocities",
     "recovery": "recoveries",
     "reference": "references",
     "map": "map_updates",

@@ -83,6 +83,7 @@ def settle_cast(topics: Sequence[TopicRows], overrides: Mapping[str, str]) -> Ca
         "points": roles.choose_simple(free("points"), "points", "point cloud", ("points",)),
         "plan": roles.choose_simple(free("plan"), "plans", "nav_msgs/Path", ("plan", "path")),
         "command": roles.choose_command(free("command")),
+        "velocity": roles.choose_velocity(free("velocity")),
         "recovery": roles.choose_recovery(free("recovery")),
     }
     if (first := found["scan"]) is not None:
@@ -116,6 +117,8 @@ def _given(role: str, name: str, topics: Sequence[TopicRows]) -> Choice:
         "initial_poses": ("poses",),
         "poses": ("poses", "odometry", "transforms"),
         "map_updates": ("costmaps",),
+        "commands": ("commands", "velocities"),
+        "velocities": ("velocities", "commands"),
     }.get(table, (table,))
     named = [t for t in topics if t.topic == name]
     rows = next((t for t in named if t.table in fitting), None)

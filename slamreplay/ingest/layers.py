@@ -14,7 +14,7 @@ from slamreplay.geometry.times import NO_STAMP
 from slamreplay.ingest.cast import Cast
 from slamreplay.ingest.grids import given_map, map_rows, recorded_maps
 from slamreplay.ingest.names import is_reference, is_sensed_dock
-from slamreplay.ingest.roles import Choice, is_costmap, is_estimate, is_initial_pose
+from slamreplay.ingest.roles import Choice, is_command, is_costmap, is_estimate, is_initial_pose
 from slamreplay.ingest.rows import TopicRows
 from slamreplay.ingest.tables import moved
 from slamreplay.maps.grid import OccupancyGrid
@@ -102,6 +102,8 @@ def _in_its_table(topic: TopicRows, cast: Cast, table_of: Mapping[str, str]) -> 
             table = "initial_poses"
         elif is_estimate(topic, cast.frames):
             table = "poses"
+    if topic.topic not in table_of and is_command(topic):
+        table = "commands"
     kind = "simulation" if topic.topic == SIMULATED_TRUTH else "motion_capture"
     return moved(topic, table, kind=kind)
 

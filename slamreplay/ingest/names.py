@@ -56,6 +56,17 @@ def is_gnss(topic: str) -> bool:
     return bool({"gps", "gnss", "navsat", "rtk"} & set(tokens(topic)))
 
 
+#: Words of those who command, in names of velocities that were not measured.
+_COMMANDERS = frozenset({"joy", "joystick", "teleop", "key", "keyboard", "nav", "mux", "target",
+                         "desired", "ref", "reference", "setpoint"})  # fmt: skip
+
+
+def is_commanded(topic: str) -> bool:
+    """Whether the name of a velocity says that it was asked for: "cmd_vel", "joy_vel"."""
+    words = tokens(topic)
+    return any(w.startswith(("cmd", "command")) for w in words) or bool(_COMMANDERS & set(words))
+
+
 def is_sensed_dock(topic: str) -> bool:
     """Nav2's `detected_dock_pose`: the dock as the robot sensed it, not where it should be."""
     words = tokens(basename(topic))

@@ -12,6 +12,7 @@ from slamreplay.bundle.no_return import told_as_range_max
 from slamreplay.bundle.schema import JUDGING_KINDS
 from slamreplay.ingest.names import (
     basename,
+    is_commanded,
     is_gnss,
     is_map_frame,
     is_odom_frame,
@@ -165,13 +166,16 @@ def choose_simple(
 ) -> Choice | None:
     """The topic with most messages in a table; names that end in a preferred word come first."""
     found = [t for t in topics if t.table == table and len(t)]
+    return _pick(found, _by_name(*preferred), what, "by name, then most messages")
 
+
+def _by_name(*preferred: str) -> Rank:
     def rank(t: TopicRows) -> tuple[object, ...]:
         name = basename(t.topic)
         place = [-i for i, word in enumerate(preferred) if name == word]
         return (place[0] if place else -len(preferred), t.messages)
 
-    return _pick(found, rank, what, "by name, then most messages")
+    return rank
 
 
 def choose_recovery(topics: Sequence[TopicRows]) -> Choice | None:
@@ -180,14 +184,28 @@ def choose_recovery(topics: Sequence[TopicRows]) -> Choice | None:
     return _pick(found, lambda t: (len(t), t.messages), "recovery actions", "most of them")
 
 
+def is_command(topic: TopicRows) -> bool:
+    """What the base was told; a stamped twist without such a name is a measurement."""
+    if topic.table == "velocities":
+        return topic.type.endswith("/TwistStamped") and is_commanded(topic.topic)
+    return topic.table == "commands"
+
+
 def choose_command(topics: Sequence[TopicRows]) -> Choice | None:
-    """What the base was told; a stamped twist without such a name may be a measurement."""
-    named = {"cmd", "command"}
-    found = [
-        t for t in topics if t.table == "commands" and len(t)
-        and (t.type.endswith("/Twist") or named & set(tokens(t.topic)))
-    ]  # fmt: skip
-    return choose_simple(found, "commands", "velocity command", ("cmd_vel", "command"))
+    """What the base was told."""
+    found = [t for t in topics if len(t) and is_command(t)]
+    return _pick(found, _by_name("cmd_vel", "command"), "velocity command",
+                 "by name, then most messages")  # fmt: skip
+
+
+def choose_velocity(topics: Sequence[TopicRows]) -> Choice | None:
+    """The measured velocity that tells most often; one with a covariance first."""
+    found = [t for t in topics if t.table == "velocities" and len(t) and not is_command(t)]
+
+    def rank(t: TopicRows) -> tuple[object, ...]:
+        return (bool(np.isfinite(t.columns["twist_covariance"]).all(axis=1).any()), t.messages)
+
+    return _pick(found, rank, "measured velocity", "with covariance, then most messages")
 
 
 def type_name(kind: str) -> str:
