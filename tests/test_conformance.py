@@ -180,6 +180,22 @@ DECODER_LINES = {
         {**VELOCITY, "frame_id": "f", "twist_covariance": COV36},
         T,
     ),
+    "sensor_msgs/msg/JointState": (
+        {
+            "header": HEADER,
+            "name": ["left", "right"],
+            "position": [1.0, 2.0],
+            "velocity": [3.0, 4.0],
+            "effort": [],
+        },
+        {"name": "left", "position": 1, "velocity": 3, "effort": np.nan},
+        T,
+    ),
+    "sensor_msgs/msg/MagneticField": (
+        {"header": HEADER, "magnetic_field": XYZ, "magnetic_field_covariance": COV9},
+        {"magnetic_field_xyz": [1, 2, 3], "magnetic_field_covariance": COV9, "frame_id": "f"},
+        T,
+    ),
     "ackermann_msgs/msg/AckermannDrive": (DRIVE, DRIVEN, None),
     "ackermann_msgs/msg/AckermannDriveStamped": ({"header": HEADER, "drive": DRIVE}, DRIVEN, T),
     "nav2_msgs/msg/BehaviorTreeLog": (

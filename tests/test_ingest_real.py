@@ -35,7 +35,7 @@ EXPECTED = {
         (None, "odom", "base_footprint"),
         {
             "odometry": "/guardian_node/odom", "scan": "/scan", "scan_2": "/hokuyo_back_scan",
-            "command": "/guardian_node/command",
+            "command": "/guardian_node/command", "joints": "/joint_states",
         },
     ),
     "olin_neato/ac109_3_demo.bag": (
@@ -71,7 +71,10 @@ EXPECTED = {
     ),
     "fixtures/turtlebot3_no_tf.bag": (
         (None, "odom", "base_footprint"),
-        {"odometry": "/odom", "scan": "/scan", "imu": "/imu", "command": "/cmd_vel"},
+        {
+            "odometry": "/odom", "scan": "/scan", "imu": "/imu", "command": "/cmd_vel",
+            "joints": "/joint_states",
+        },
     ),
 }  # fmt: skip
 

@@ -128,6 +128,20 @@ _SCHEMAS = (
         _covariance("linear_acceleration_covariance", 9, "frame_id", "3x3 row-major"),
     ),
     _table(
+        "magnetic_fields",
+        "magnetic field as it was measured",
+        _FRAME,
+        Column("magnetic_field_xyz", "float64", 3, "T", "frame_id", "NaN on axes without a sensor"),
+        Column(
+            "magnetic_field_covariance",
+            "float64",
+            9,
+            "T^2",
+            "frame_id",
+            "3x3 row-major; NaN where none was given",
+        ),
+    ),
+    _table(
         "scans",
         "planar lidar scans",
         _FRAME,
@@ -213,6 +227,14 @@ _SCHEMAS = (
         Column("linear_velocity_xyz", "float64", 3, "m/s", "frame_id", "velocity"),
         Column("angular_velocity_xyz", "float64", 3, "rad/s", "frame_id", "turn rate"),
         _covariance("twist_covariance", 36, "frame_id", "6x6 row-major"),
+    ),
+    _table(
+        "joints",
+        "joints and wheels, one row each; NaN where a message does not tell",
+        Column("name", "str", doc="of the joint"),
+        Column("position", "float64", unit="rad or m", doc="rad if it turns, m if it slides"),
+        Column("velocity", "float64", unit="rad/s or m/s", doc="rate of the position"),
+        Column("effort", "float64", unit="N m or N", doc="torque if it turns, else force"),
     ),
     _table(
         "recoveries",

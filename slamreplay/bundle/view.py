@@ -172,6 +172,8 @@ ROLE_TABLES = {
     "plan": "plans",
     "command": "commands",
     "velocity": "velocities",
+    "joints": "joints",
+    "magnetic_field": "magnetic_fields",
     "recovery": "recoveries",
     "reference": "references",
     "map": "map_updates",

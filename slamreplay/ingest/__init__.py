@@ -32,6 +32,8 @@ DECODERS = Registry(
         "nav2_msgs/msg/ParticleCloud": f"{_HERE}.particles:PARTICLE_CLOUD",
         "tf2_msgs/msg/TFMessage": f"{_HERE}.transforms:TRANSFORMS",
         "tf/msg/tfMessage": f"{_HERE}.transforms:TRANSFORMS",
+        "sensor_msgs/msg/JointState": f"{_HERE}.joint_state:JOINT_STATE",
+        "sensor_msgs/msg/MagneticField": f"{_HERE}.magnetic_field:MAGNETIC_FIELD",
         "nav_msgs/msg/OccupancyGrid": f"{_HERE}.grid:OCCUPANCY_GRID",
         "nav2_msgs/msg/Costmap": f"{_HERE}.grid:COSTMAP",
         "nav_msgs/msg/Path": f"{_HERE}.path:PATH",

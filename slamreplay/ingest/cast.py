@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 from slamreplay.bundle.manifest import Frames, Loss
@@ -84,6 +84,7 @@ def settle_cast(topics: Sequence[TopicRows], overrides: Mapping[str, str]) -> Ca
         "plan": roles.choose_simple(free("plan"), "plans", "nav_msgs/Path", ("plan", "path")),
         "command": roles.choose_command(free("command")),
         "velocity": roles.choose_velocity(free("velocity")),
+        **_others(free),
         "recovery": roles.choose_recovery(free("recovery")),
     }
     if (first := found["scan"]) is not None:
@@ -97,6 +98,15 @@ def settle_cast(topics: Sequence[TopicRows], overrides: Mapping[str, str]) -> Ca
         found["covariance"] = Choice(pose.rows, "the pose's own")
     choices = {role: choice for role, choice in found.items() if choice is not None}
     return Cast([*others, *tag_sightings(tf_rows), *tf_rows], choices, frames, losses)
+
+
+def _others(free: Callable[[str], list[TopicRows]]) -> dict[str, Choice | None]:
+    """Roles of one message type each, that no other role hangs on."""
+    simple = {
+        "joints": ("joints", "sensor_msgs/JointState", ("joint_states",)),
+        "magnetic_field": ("magnetic_fields", "sensor_msgs/MagneticField", ("mag",)),
+    }
+    return {role: roles.choose_simple(free(role), *how) for role, how in simple.items()}
 
 
 def _not_given(topics: Sequence[TopicRows], overrides: Mapping[str, str]):  # type: ignore[no-untyped-def]
