@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
-from slamreplay.bundle.manifest import Frames, Loss
+from slamreplay.bundle.manifest import FrameEdge, Frames, Loss
 from slamreplay.bundle.view import ROLE_TABLES
 from slamreplay.errors import UsageError
 from slamreplay.ingest import roles
+from slamreplay.ingest.dead_reckoning import dead_reckoned, is_carried, is_in_body
 from slamreplay.ingest.frames import direct_pose, find_frames, settle, without_frame
 from slamreplay.ingest.lasers import second_scan
 from slamreplay.ingest.leaks import repeated_reference
@@ -16,6 +17,7 @@ from slamreplay.ingest.names import is_map_frame, is_reference, tokens
 from slamreplay.ingest.roles import Choice
 from slamreplay.ingest.rows import TopicRows
 from slamreplay.ingest.sightings import tag_sightings
+from slamreplay.ingest.tables import moved
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,8 +61,17 @@ def settle_cast(topics: Sequence[TopicRows], overrides: Mapping[str, str]) -> Ca
         "particles": roles.choose_particles(free("particles")),
     }
     found |= given
-    odometry = found["odometry"]
     map_frames = _map_frames(others, found)
+    named = overrides
+    if found["odometry"] is None:
+        here = find_frames(tree, None, map_frames, overrides, lambda *_: False)
+        made, lost = _dead_reckoned(free("velocity"), found, tree, here)
+        losses += lost
+        if made is not None:
+            others.append(made.rows)
+            found["odometry"] = made
+            named = {"odom_frame": made.rows.frame(), **overrides}
+    odometry = found["odometry"]
     references = [t for t in others if is_reference(t.topic) and t.table in ("poses", "odometry")]
     disguised: dict[str, str] = {}
 
@@ -71,7 +82,7 @@ def settle_cast(topics: Sequence[TopicRows], overrides: Mapping[str, str]) -> Ca
         return topic is not None
 
     odometry_rows = odometry.rows if odometry else None
-    frames = find_frames(tree, odometry_rows, map_frames, overrides, is_disguise)
+    frames = find_frames(tree, odometry_rows, map_frames, named, is_disguise)
     for frame, topic in disguised.items():
         if frame != frames.map:
             frames, tf_rows, loss = without_frame(frame, topic, frames, tf_rows)
@@ -98,6 +109,30 @@ def settle_cast(topics: Sequence[TopicRows], overrides: Mapping[str, str]) -> Ca
         found["covariance"] = Choice(pose.rows, "the pose's own")
     choices = {role: choice for role, choice in found.items() if choice is not None}
     return Cast([*others, *tag_sightings(tf_rows), *tf_rows], choices, frames, losses)
+
+
+def _dead_reckoned(
+    topics: Sequence[TopicRows],
+    found: Mapping[str, Choice | None],
+    tree: Sequence[FrameEdge],
+    frames: Frames,
+) -> tuple[Choice | None, list[Loss]]:
+    """Odometry made of measured velocities where tf has none either."""
+    if is_carried(tree, frames):
+        return None, []
+    given = found.get("velocity")
+    velocity = given or roles.choose_velocity([t for t in topics if is_in_body(t)])
+    if velocity is None or not is_in_body(velocity.rows):
+        velocity = velocity or roles.choose_velocity(topics)
+        if velocity is None:
+            return None, []
+        reason = "not dead-reckoned: along axes of the world, and no heading is known"
+        rows = velocity.rows
+        return None, [Loss(kind="skipped", what=rows.topic, count=len(rows), reason=reason)]
+    rows = moved(velocity.rows, "velocities")
+    made, losses = dead_reckoned(rows, tree, frames.base)
+    reason = f"dead-reckoned from the velocities of {roles.type_name(rows.type)}"
+    return Choice(made, reason), losses
 
 
 def _others(free: Callable[[str], list[TopicRows]]) -> dict[str, Choice | None]:

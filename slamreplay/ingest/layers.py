@@ -91,6 +91,8 @@ def _in_its_table(topic: TopicRows, cast: Cast, table_of: Mapping[str, str]) -> 
     table = table_of.get(topic.topic, topic.table)
     if topic.table in ("transforms", "references"):  # tags on tf share their topic's name with it
         return topic
+    if {topic.table, table} == {"odometry", "velocities"}:  # so does odometry made of velocities
+        return topic
     if topic.topic not in table_of and topic.table == "poses" and is_sensed_dock(topic.topic):
         dock = moved(topic, "references", kind="dock")
         child = np.full(len(dock), "dock", dtype=object)
