@@ -154,6 +154,19 @@ DECODER_LINES = {
     ),
     "tf2_msgs/msg/TFMessage": ({"transforms": [TF]}, EDGE, T),
     "tf/msg/tfMessage": ({"transforms": [TF]}, EDGE, T),
+    "std_msgs/msg/Float32": ({"data": 0.5}, {"value": 0.5}, None),
+    "std_msgs/msg/Float64": ({"data": 0.5}, {"value": 0.5}, None),
+    "geometry_msgs/msg/Vector3Stamped": (
+        {"header": HEADER, "vector": XYZ},
+        {"name": "x", "value": 1},
+        T,
+    ),
+    "autoware_internal_debug_msgs/msg/Float32Stamped": (
+        {"stamp": STAMP, "data": 0.5},
+        {"value": 0.5},
+        T,
+    ),
+    "tier4_debug_msgs/msg/Float32Stamped": ({"stamp": STAMP, "data": 0.5}, {"value": 0.5}, T),
     "nav_msgs/msg/OccupancyGrid": (
         {"header": HEADER, "info": GRID, "data": [0, 100]},
         {"cells": [0, 100], "width": 2, "origin_xyyaw": [1, 2, YAW]},

@@ -261,6 +261,12 @@ _SCHEMAS = (
         _POSE_COV,
     ),
     _table(
+        "signals",
+        "numbers a localizer says of itself, one row each",
+        Column("name", "str", doc="of the number: alpha, reliability, transform_probability"),
+        Column("value", "float64", doc="as recorded; its scale is the localizer's own"),
+    ),
+    _table(
         "health",
         "diagnostics and log lines",
         Column("level", "int32", doc="as the message type counts"),

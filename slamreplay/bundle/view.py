@@ -174,6 +174,7 @@ ROLE_TABLES = {
     "velocity": "velocities",
     "joints": "joints",
     "magnetic_field": "magnetic_fields",
+    "quality": "signals",
     "recovery": "recoveries",
     "reference": "references",
     "map": "map_updates",

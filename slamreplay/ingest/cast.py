@@ -13,7 +13,7 @@ from slamreplay.ingest.dead_reckoning import dead_reckoned, is_carried, is_in_bo
 from slamreplay.ingest.frames import direct_pose, find_frames, settle, without_frame
 from slamreplay.ingest.lasers import second_scan
 from slamreplay.ingest.leaks import repeated_reference
-from slamreplay.ingest.names import is_map_frame, is_reference, tokens
+from slamreplay.ingest.names import SCORES, is_map_frame, is_reference, tokens
 from slamreplay.ingest.roles import Choice
 from slamreplay.ingest.rows import TopicRows
 from slamreplay.ingest.sightings import tag_sightings
@@ -140,6 +140,7 @@ def _others(free: Callable[[str], list[TopicRows]]) -> dict[str, Choice | None]:
     simple = {
         "joints": ("joints", "sensor_msgs/JointState", ("joint_states",)),
         "magnetic_field": ("magnetic_fields", "sensor_msgs/MagneticField", ("mag",)),
+        "quality": ("signals", "a localizer's word on itself", SCORES),
     }
     return {role: roles.choose_simple(free(role), *how) for role, how in simple.items()}
 

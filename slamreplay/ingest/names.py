@@ -67,6 +67,21 @@ def is_commanded(topic: str) -> bool:
     return any(w.startswith(("cmd", "command")) for w in words) or bool(_COMMANDERS & set(words))
 
 
+#: Scores by their own names: als_ros, emcl2, Autoware's NDT; the best kept first.
+SCORES = ("reliability", "failure_probability", "nearest_voxel_transformation_likelihood",
+          "transform_probability", "alpha")  # fmt: skip
+_SCORED = frozenset({"score", "confidence", "quality", "reliability", "likelihood", "fitness",
+                     "probability"})  # fmt: skip
+_SCORERS = frozenset({"localization", "localisation", "localizer", "localiser", "amcl", "mcl",
+                      "ndt", "icp", "slam", "matching", "matcher", "match"})  # fmt: skip
+
+
+def is_quality(topic: str) -> bool:
+    """Whether a name says that a number is a localizer's word on itself: "/ndt/fitness_score"."""
+    words = set(tokens(topic))
+    return basename(topic) in SCORES or bool(words & _SCORED and words & _SCORERS)
+
+
 def is_sensed_dock(topic: str) -> bool:
     """Nav2's `detected_dock_pose`: the dock as the robot sensed it, not where it should be."""
     words = tokens(basename(topic))

@@ -12,6 +12,7 @@ from slamreplay.bundle.manifest import Frames, Loss, Manifest, Role, Source
 from slamreplay.bundle.store import MANIFEST, write_bundle
 from slamreplay.bundle.view import Bundle
 from slamreplay.ingest.assembly import Assembly
+from slamreplay.ingest.by_name import without_meaning
 from slamreplay.ingest.cast import settle_cast
 from slamreplay.ingest.clock import choose_clock, row_times
 from slamreplay.ingest.lasers import no_returns
@@ -76,7 +77,9 @@ def _ingest(
             names = [c.topic for c in connections]
             if options.robot is None and not overrides:
                 refuse_mixture(connections)
-            skip = topic_filter(names, options.robot)
+            of_robot = topic_filter(names, options.robot)
+            of_use = without_meaning(connections, overrides.values())
+            skip = lambda topic: of_robot(topic) or of_use(topic)  # noqa: E731
             topics, lost = read_rows(readers, skip, progress, scratch)
         losses = [*losses, *lost]
     if options.robot is not None:

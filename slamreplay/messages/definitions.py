@@ -13,6 +13,7 @@ UbiquityRobotics/fiducials, magazino/move_base_flex.
 from __future__ import annotations
 
 from slamreplay.messages.drives import DRIVES
+from slamreplay.messages.signals import SIGNALS
 
 #: Type name ("package/msg/Name") to its fields, one per line.
 DEFINITIONS: dict[str, str] = {
@@ -113,6 +114,7 @@ DEFINITIONS: dict[str, str] = {
     "tf/msg/tfMessage": "geometry_msgs/TransformStamped[] transforms\n",
     "tf2_msgs/msg/TFMessage": "geometry_msgs/TransformStamped[] transforms\n",
     **DRIVES,
+    **SIGNALS,
 }
 
 #: Newer layouts of the same names; a log that has them says so in its own definitions.
