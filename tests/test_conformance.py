@@ -229,6 +229,50 @@ DECODER_LINES = {
         {"level": 2, "name": "n", "message": "hot"},
         T,
     ),
+    "diagnostic_msgs/msg/DiagnosticStatus": (
+        {"level": b"\x02", "name": "n", "message": "hot", "values": []},
+        {"level": 2, "name": "n", "message": "hot"},
+        None,
+    ),
+    "sensor_msgs/msg/BatteryState": (
+        {"header": HEADER, "power_supply_status": 1, "current": 2.0, "location": ""},
+        {"level": 20, "name": "battery", "message": "charging"},
+        T,
+    ),
+    "rcl_interfaces/msg/ParameterEvent": (
+        {
+            "stamp": STAMP,
+            "node": "/amcl",
+            "new_parameters": [],
+            "changed_parameters": [
+                {"name": "max_beams", "value": {"type": 2, "integer_value": 60}},
+            ],
+            "deleted_parameters": [],
+        },
+        {"level": 20, "name": "/amcl: max_beams", "message": "set to 60"},
+        T,
+    ),
+    "dynamic_reconfigure/msg/Config": (
+        {
+            "bools": [{"name": "on", "value": True}],
+            "ints": [],
+            "strs": [],
+            "doubles": [],
+            "groups": [],
+        },
+        {"level": 20, "name": ": on", "message": "set to true"},
+        None,
+    ),
+    "lifecycle_msgs/msg/TransitionEvent": (
+        {
+            "timestamp": 0,
+            "transition": {"id": 3, "label": "activate"},
+            "start_state": {"id": 2, "label": "inactive"},
+            "goal_state": {"id": 3, "label": "active"},
+        },
+        {"level": 20, "message": "inactive -> active"},
+        None,
+    ),
     "rcl_interfaces/msg/Log": ({"stamp": STAMP, **LOG}, {"level": 4, "message": "text"}, T),
     "rosgraph_msgs/msg/Log": ({"header": HEADER, **LOG}, {"level": 4, "message": "text"}, T),
 }

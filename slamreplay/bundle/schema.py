@@ -268,8 +268,8 @@ _SCHEMAS = (
     ),
     _table(
         "health",
-        "diagnostics and log lines",
-        Column("level", "int32", doc="as the message type counts"),
+        "diagnostics, log lines, parameters, states of nodes and batteries",
+        Column("level", "int32", doc="as the message type counts; 20, info, where it has none"),
         Column("name", "str", doc="who says it"),
         Column("message", "str", doc="what was said"),
     ),
