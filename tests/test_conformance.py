@@ -273,6 +273,7 @@ DECODER_LINES = {
         {"level": 20, "message": "inactive -> active"},
         None,
     ),
+    "rosgraph_msgs/msg/Clock": ({"clock": STAMP}, {"clock_ns": T}, None),
     "rcl_interfaces/msg/Log": ({"stamp": STAMP, **LOG}, {"level": 4, "message": "text"}, T),
     "rosgraph_msgs/msg/Log": ({"header": HEADER, **LOG}, {"level": 4, "message": "text"}, T),
 }

@@ -152,6 +152,24 @@ def test_a_single_diagnostic_status(logs):
     assert rows.columns["level"].tolist() == [2]
 
 
+def test_a_clock_tells_its_time_and_is_placed_by_when_it_was_recorded(logs, tmp_path):
+    kind = "rosgraph_msgs/msg/Clock"
+
+    def make(ros):
+        return [logs.make(kind, ros), logs.make(kind, ros, clock__sec=2**31 - 1, clock__nanosec=5)]
+
+    rows, _ = read_back(logs, kind, make)
+
+    assert rows.columns["clock_ns"].tolist() == [0, (2**31 - 1) * SECOND + 5]
+    odometry = logs.make(ODOM, header__frame_id="odom", pose__pose__orientation__w=1.0)
+    messages = [("/odom", ODOM, odometry, EPOCH), ("/clock", kind, make(2)[1], EPOCH + SECOND)]
+    bundle = ingest([logs.write("log.mcap", messages)], tmp_path / "b")
+    table = bundle.view().role("clock")
+    assert table["t_log_ns"].tolist() == table.t_ns.tolist() == [EPOCH + SECOND]
+    assert table["clock_ns"].dtype == np.int64
+    assert not [x for x in bundle.manifest.losses if x.what == "/clock"]
+
+
 @pytest.mark.parametrize("name", ["log.mcap", "log.db3"])
 def test_charging_edges_of_a_log_and_no_false_protective_stop(logs, tmp_path, name):
     messages = []

@@ -43,7 +43,7 @@ EXPECTED = {
         {
             "odometry": "/odom", "scan": "/scan", "pose": "/tf", "map": "/map",
             "particles": "/particlecloud", "initial_pose": "/initialpose", "command": "/cmd_vel",
-            "points": "/projected_stable_scan",
+            "points": "/projected_stable_scan", "clock": "/clock",
         },
     ),
     TB4: (
@@ -62,7 +62,7 @@ EXPECTED = {
         ("map", None, None),
         {
             "pose": "/amcl_pose", "covariance": "/amcl_pose",
-            "reference": "/base_pose_ground_truth",
+            "reference": "/base_pose_ground_truth", "clock": "/clock",
         },
     ),
     "jackal/test_2026-02-17-15-54-31.bag": (

@@ -274,6 +274,11 @@ _SCHEMAS = (
         Column("message", "str", doc="what was said"),
     ),
     _table(
+        "clock",
+        "simulated or replayed time, as it was told to every node",
+        Column("clock_ns", "int64", unit="ns", doc="the time that was told"),
+    ),
+    _table(
         "map_updates",
         "from when on which map version held",
         Column("map_version", "str", doc="hash of content and metadata; folder under maps/"),

@@ -175,6 +175,7 @@ ROLE_TABLES = {
     "joints": "joints",
     "magnetic_field": "magnetic_fields",
     "quality": "signals",
+    "clock": "clock",
     "recovery": "recoveries",
     "reference": "references",
     "map": "map_updates",

@@ -58,6 +58,7 @@ DECODERS = Registry(
         "rcl_interfaces/msg/ParameterEvent": f"{_HERE}.parameters:PARAMETER_EVENT",
         "dynamic_reconfigure/msg/Config": f"{_HERE}.parameters:RECONFIGURE",
         "lifecycle_msgs/msg/TransitionEvent": f"{_HERE}.lifecycle:TRANSITION_EVENT",
+        "rosgraph_msgs/msg/Clock": f"{_HERE}.clock:CLOCK",
         "rcl_interfaces/msg/Log": f"{_HERE}.health:LOG",
         "rosgraph_msgs/msg/Log": f"{_HERE}.health:LOG",
     },

@@ -140,6 +140,7 @@ def _others(free: Callable[[str], list[TopicRows]]) -> dict[str, Choice | None]:
     simple = {
         "joints": ("joints", "sensor_msgs/JointState", ("joint_states",)),
         "magnetic_field": ("magnetic_fields", "sensor_msgs/MagneticField", ("mag",)),
+        "clock": ("clock", "rosgraph_msgs/Clock", ("clock",)),
         "quality": ("signals", "a localizer's word on itself", SCORES),
     }
     return {role: roles.choose_simple(free(role), *how) for role, how in simple.items()}

@@ -102,7 +102,8 @@ def row_times(topic: TopicRows, clock: Clock) -> tuple[Times, list[Loss]]:
 _UNSTAMPED = frozenset({"geometry_msgs/msg/Twist", "ackermann_msgs/msg/AckermannDrive",
                         "std_msgs/msg/Float32", "std_msgs/msg/Float64", "map_server",
                         "diagnostic_msgs/msg/DiagnosticStatus", "dynamic_reconfigure/msg/Config",
-                        "lifecycle_msgs/msg/TransitionEvent"})  # fmt: skip
+                        "lifecycle_msgs/msg/TransitionEvent",
+                        "rosgraph_msgs/msg/Clock"})  # fmt: skip
 #: Types of logs that one process wrote line by line as messages came, each topic from one
 #: publisher: of two rows the later one is the later one, whatever the stamps say.
 _IN_ORDER = ("carmen/", "mrclam/")
