@@ -55,6 +55,7 @@ IMU = {"orientation": TURN, "angular_velocity": XYZ, "linear_acceleration": XYZ}
 IMU_COV = {f"{name}_covariance": COV9 for name in IMU}
 ERRORS = {"image_error": 0.1, "object_error": 0.1, "fiducial_area": 9.0}
 VELOCITY = {"linear_velocity_xyz": [1, 2, 3], "angular_velocity_xyz": [4, 5, 6]}
+MARKER = {"header": HEADER, "id": 7, "pose": POSED, "confidence": 1.0}
 DRIVE = {"speed": 1.5, "steering_angle": 0.2}
 DRIVEN = {"linear_velocity_xyz": [1.5, 0, 0], "angular_velocity_xyz": [0, 0, np.nan]}
 
@@ -132,6 +133,57 @@ DECODER_LINES = {
             "detections": [{"id": [7], "size": [0.1], "pose": {"header": HEADER, "pose": POSED}}],
         },
         {**PLACED, "child_frame_id": "tag_7", "covariance": COV36},
+        T,
+    ),
+    "isaac_ros_apriltag_interfaces/msg/AprilTagDetectionArray": (
+        {
+            "header": HEADER,
+            "detections": [{"family": "36h11", "id": 7, "pose": {"header": HEADER, "pose": POSED}}],
+        },
+        {**PLACED, "child_frame_id": "tag_7", "covariance": COV36},
+        T,
+    ),
+    "aruco_msgs/msg/MarkerArray": (
+        {"header": HEADER, "markers": [MARKER]},
+        {**PLACED, "child_frame_id": "tag_7", "covariance": COV36},
+        T,
+    ),
+    "aruco_msgs/msg/Marker": (
+        MARKER,
+        {**PLACED, "child_frame_id": "tag_7", "covariance": COV36},
+        T,
+    ),
+    "ros2_aruco_interfaces/msg/ArucoMarkers": (
+        {"header": HEADER, "marker_ids": [7], "poses": [POSE]},
+        {**PLACED, "child_frame_id": "tag_7", "kind": "fiducial"},
+        T,
+    ),
+    "aruco_interfaces/msg/ArucoMarkers": (
+        {"header": HEADER, "marker_ids": [7], "poses": [POSE]},
+        {**PLACED, "child_frame_id": "tag_7", "kind": "fiducial"},
+        T,
+    ),
+    "ar_track_alvar_msgs/msg/AlvarMarkers": (
+        {
+            "header": {"stamp": {"sec": 0, "nanosec": 0}, "frame_id": ""},
+            "markers": [{"header": HEADER, "id": 7, "pose": {"header": HEADER, "pose": POSE}}],
+        },
+        {**PLACED, "child_frame_id": "tag_7", "kind": "fiducial"},
+        T,
+    ),
+    "cartographer_ros_msgs/msg/LandmarkList": (
+        {
+            "header": HEADER,
+            "landmark": [
+                {
+                    "id": "7",
+                    "tracking_from_landmark_transform": POSE,
+                    "translation_weight": 1.0,
+                    "rotation_weight": 1.0,
+                }
+            ],
+        },
+        {**PLACED, "child_frame_id": "tag_7", "covariance": [np.nan] * 36},
         T,
     ),
     "sensor_msgs/msg/NavSatFix": (

@@ -117,7 +117,8 @@ def test_fixes_without_bounds_are_counted_and_covariances_without_bounds_not_kno
 
 @pytest.mark.parametrize(
     ("frame", "is_tag"),
-    [("tag_0", True), ("/tag36h11:12", True), ("robot/fiducial_3", True), ("tag", False),
+    [("tag_0", True), ("/tag36h11:12", True), ("36h11:0", True), ("41h12:3", True),
+     ("4h:3", False), ("robot/fiducial_3", True), ("tag", False),
      ("stage_0", False), ("camera_tag_mount", False), ("laser_2", False)],
 )  # fmt: skip
 def test_names_of_tag_frames(frame, is_tag):

@@ -168,8 +168,9 @@ def _covariance(covariance: se2.Array, R: se2.Array, xy: se2.Array) -> se2.Array
     full = np.where(np.isfinite(covariance), covariance, np.nan).reshape(-1, 6, 6)
     position = (R @ full[:, :3, :3] @ np.swapaxes(R, 1, 2))[:, :2, :2]
     turn = (R @ full[:, 3:, 3:] @ np.swapaxes(R, 1, 2))[:, 2, 2]
-    told = np.isfinite(position).all(axis=(1, 2)) & np.isfinite(turn) & (turn > 0.0)
+    told: NDArray[np.bool_] = np.asarray(np.isfinite(position).all(axis=(1, 2)))
     told[told] = np.linalg.eigvalsh(position[told])[:, 0] > 0.0
     out[told, :2, :2] += position[told]
+    told = np.isfinite(turn) & (turn > 0.0)  # a reflector has a place and no heading
     out[told, 2, 2] += turn[told]
     return out

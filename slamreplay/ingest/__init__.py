@@ -50,6 +50,15 @@ DECODERS = Registry(
         "nav2_msgs/msg/BehaviorTreeLog": f"{_HERE}.behavior_tree:BEHAVIOR_TREE_LOG",
         "fiducial_msgs/msg/FiducialTransformArray": f"{_HERE}.fiducials:FIDUCIAL_TRANSFORMS",
         "apriltag_ros/msg/AprilTagDetectionArray": f"{_HERE}.fiducials:APRILTAG_DETECTIONS",
+        "isaac_ros_apriltag_interfaces/msg/AprilTagDetectionArray": (
+            f"{_HERE}.tags:ISAAC_DETECTIONS"
+        ),
+        "aruco_msgs/msg/MarkerArray": f"{_HERE}.tags:ARUCO_MARKERS",
+        "aruco_msgs/msg/Marker": f"{_HERE}.tags:ARUCO_MARKER",
+        "ros2_aruco_interfaces/msg/ArucoMarkers": f"{_HERE}.tags:ARUCO_LISTS",
+        "aruco_interfaces/msg/ArucoMarkers": f"{_HERE}.tags:ARUCO_LISTS",
+        "ar_track_alvar_msgs/msg/AlvarMarkers": f"{_HERE}.tags:ALVAR_MARKERS",
+        "cartographer_ros_msgs/msg/LandmarkList": f"{_HERE}.tags:LANDMARKS",
         "sensor_msgs/msg/NavSatFix": f"{_HERE}.nav_sat_fix:NAV_SAT_FIX",
         "move_base_msgs/msg/RecoveryStatus": f"{_HERE}.recovery_status:RECOVERY_STATUS",
         "diagnostic_msgs/msg/DiagnosticArray": f"{_HERE}.health:DIAGNOSTICS",

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from slamreplay.messages.drives import DRIVES
 from slamreplay.messages.signals import SIGNALS
+from slamreplay.messages.tags import TAGS
 
 #: Type name ("package/msg/Name") to its fields, one per line.
 DEFINITIONS: dict[str, str] = {
@@ -115,6 +116,7 @@ DEFINITIONS: dict[str, str] = {
     "tf2_msgs/msg/TFMessage": "geometry_msgs/TransformStamped[] transforms\n",
     **DRIVES,
     **SIGNALS,
+    **TAGS,
 }
 
 #: Newer layouts of the same names; a log that has them says so in its own definitions.
