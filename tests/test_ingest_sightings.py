@@ -115,6 +115,29 @@ def test_fixes_without_bounds_are_counted_and_covariances_without_bounds_not_kno
     assert [x.count for x in bundle.manifest.losses if x.what == "/fix"] == [2]
 
 
+@pytest.mark.parametrize(("frame", "kept"), [("tag_7", "/markers"), ("36h11:7", "/tf")])
+def test_a_tag_told_in_a_message_and_on_tf_was_seen_once(logs, tmp_path, frame, kept):
+    markers, odom = "aruco_msgs/msg/MarkerArray", ("odom", "base_link")
+    messages = []
+    for step in range(4):
+        t = (1_700_000_000 * SECOND) + step * 10**8
+        place = {"pose__pose__position__x": 1.0 + step, "pose__pose__orientation__w": 1.0}
+        marker = logs.make("aruco_msgs/msg/Marker", id=7, confidence=1.0, **place)
+        seen = stamped(logs, markers, step, header__frame_id="camera", markers=[marker])
+        edges = [edge(logs, step, *odom), edge(logs, step, "camera", frame, 1.0 + step)]
+        messages += [
+            ("/tf", TF, logs.make(TF, transforms=edges), t),
+            ("/markers", markers, seen, t),
+        ]
+
+    bundle = ingest([logs.write("log.mcap", messages)], tmp_path / "b")
+
+    rows = bundle.table("references")
+    assert (rows["topic"].tolist(), set(rows["child_frame_id"])) == ([kept] * 4, {frame})
+    (loss,) = [x for x in bundle.manifest.losses if x.kind == "skipped"]
+    assert (loss.count, loss.reason) == (4, "tags told twice, in a message and on tf")
+
+
 @pytest.mark.parametrize(
     ("frame", "is_tag"),
     [("tag_0", True), ("/tag36h11:12", True), ("36h11:0", True), ("41h12:3", True),

@@ -10,6 +10,7 @@ from slamreplay.bundle.view import ROLE_TABLES
 from slamreplay.errors import UsageError
 from slamreplay.ingest import roles
 from slamreplay.ingest.dead_reckoning import dead_reckoned, is_carried, is_in_body
+from slamreplay.ingest.doubles import without_doubles
 from slamreplay.ingest.frames import direct_pose, find_frames, settle, without_frame
 from slamreplay.ingest.lasers import second_scan
 from slamreplay.ingest.leaks import repeated_reference
@@ -108,7 +109,8 @@ def settle_cast(topics: Sequence[TopicRows], overrides: Mapping[str, str]) -> Ca
     if "covariance" not in found and pose is not None and roles.has_covariance(pose.rows):
         found["covariance"] = Choice(pose.rows, "the pose's own")
     choices = {role: choice for role, choice in found.items() if choice is not None}
-    return Cast([*others, *tag_sightings(tf_rows), *tf_rows], choices, frames, losses)
+    seen, others, doubles = without_doubles(tag_sightings(tf_rows), others)
+    return Cast([*others, *seen, *tf_rows], choices, frames, [*losses, *doubles])
 
 
 def _dead_reckoned(
