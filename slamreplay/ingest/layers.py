@@ -13,7 +13,7 @@ from slamreplay.bundle.view import ROLE_TABLES
 from slamreplay.geometry.times import NO_STAMP
 from slamreplay.ingest.cast import Cast
 from slamreplay.ingest.grids import given_map, map_rows, recorded_maps
-from slamreplay.ingest.names import is_reference, is_sensed_dock
+from slamreplay.ingest.names import is_reference, is_sensed_dock, why_no_dock
 from slamreplay.ingest.roles import Choice, is_command, is_costmap, is_estimate, is_initial_pose
 from slamreplay.ingest.rows import TopicRows
 from slamreplay.ingest.tables import moved
@@ -83,7 +83,7 @@ def _no_use(
     is_belief = is_estimate(topic, cast.frames) or is_initial_pose(topic)
     is_known = is_belief or is_reference(topic.topic) or is_sensed_dock(topic.topic)
     if topic.table == "poses" and not is_known:
-        return "a pose, but not the robot's in a map"
+        return why_no_dock(topic.topic) or "a pose, but not the robot's in a map"
     return None
 
 

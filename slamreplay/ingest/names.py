@@ -86,3 +86,16 @@ def is_sensed_dock(topic: str) -> bool:
     """Nav2's `detected_dock_pose`: the dock as the robot sensed it, not where it should be."""
     words = tokens(basename(topic))
     return "dock" in words and bool({"detected", "detection"} & set(words))
+
+
+#: Poses of Nav2's docking server beside the detected one, and what they are (simple_charging_dock).
+_DOCKING = {
+    "dock_pose": "where docking takes the dock to be: as it was given, or made of detections",
+    "filtered_dock_pose": "detections of the dock, smoothed: no measurement of its own",
+    "staging_pose": "where docking begins: a goal",
+}
+
+
+def why_no_dock(topic: str) -> str | None:
+    """Why a pose of the docking server is no sighting of the dock; None for other topics."""
+    return _DOCKING.get(basename(topic))

@@ -12,11 +12,11 @@ from slamreplay.bundle.manifest import Frames, Loss, Manifest, Role, Source
 from slamreplay.bundle.store import MANIFEST, write_bundle
 from slamreplay.bundle.view import Bundle
 from slamreplay.ingest.assembly import Assembly
-from slamreplay.ingest.by_name import without_meaning
 from slamreplay.ingest.cast import settle_cast
 from slamreplay.ingest.clock import choose_clock, row_times
 from slamreplay.ingest.lasers import no_returns
 from slamreplay.ingest.layers import lay_out
+from slamreplay.ingest.meaning import without_meaning
 from slamreplay.ingest.options import IngestOptions
 from slamreplay.ingest.overrides import check_topics, read_overrides
 from slamreplay.ingest.parts import missing_parts

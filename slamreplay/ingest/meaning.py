@@ -1,9 +1,13 @@
-"""Types that anybody uses for anything: read only where the topic's name says what it is."""
+"""Topics that are not read: types that tell nothing here, and types that need a name that tells.
+
+Anybody sends a plain number or a set of markers for anything; only the topic's name says for what.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
 
+from slamreplay.ingest import DECODERS
 from slamreplay.ingest.names import is_quality
 from slamreplay.ingest.readers.reader import Connection
 
@@ -15,6 +19,16 @@ _NAMED: dict[str, tuple[Callable[[str], bool], str]] = {
     "geometry_msgs/msg/Vector3Stamped": _SCORE,
     "autoware_internal_debug_msgs/msg/Float32Stamped": _SCORE,
     "tier4_debug_msgs/msg/Float32Stamped": _SCORE,
+}
+
+#: Message types that are known and have no rows, and why.
+_NO_ROWS = {
+    "apriltag_msgs/msg/AprilTagDetectionArray": (
+        "tags without a pose: apriltag_ros puts their poses on tf"
+    ),
+    "fiducial_msgs/msg/FiducialArray": "corners of tags in an image, without a pose",
+    "nav_msgs/msg/MapMetaData": "size and origin of a map, without its cells",
+    "cartographer_ros_msgs/msg/SubmapList": "poses of submaps, which tell of no closure",
 }
 
 
@@ -30,6 +44,9 @@ def without_meaning(
     reasons: dict[str, str] = {}
     meant = set(asked_for)
     for connection in connections:
+        if connection.type in _NO_ROWS and connection.type not in DECODERS:  # but for a plug-in's
+            reasons[connection.topic] = _NO_ROWS[connection.type]
+            continue
         fits, reason = _NAMED.get(connection.type, (lambda _: True, ""))
         if fits(connection.topic):
             meant.add(connection.topic)
