@@ -56,6 +56,7 @@ IMU_COV = {f"{name}_covariance": COV9 for name in IMU}
 ERRORS = {"image_error": 0.1, "object_error": 0.1, "fiducial_area": 9.0}
 VELOCITY = {"linear_velocity_xyz": [1, 2, 3], "angular_velocity_xyz": [4, 5, 6]}
 MARKER = {"header": HEADER, "id": 7, "pose": POSED, "confidence": 1.0}
+NODE = {"header": HEADER, "ns": "slam_toolbox", "type": 2, "action": 0, "points": []}
 DRIVE = {"speed": 1.5, "steering_angle": 0.2}
 DRIVEN = {"linear_velocity_xyz": [1.5, 0, 0], "angular_velocity_xyz": [0, 0, np.nan]}
 
@@ -324,6 +325,48 @@ DECODER_LINES = {
         },
         {"level": 20, "message": "inactive -> active"},
         None,
+    ),
+    "rtabmap_msgs/msg/Info": (
+        {
+            "header": HEADER,
+            "ref_id": 12,
+            "loop_closure_id": 3,
+            "proximity_detection_id": 0,
+            "landmark_id": 0,
+            "stats_keys": ["Loop/Highest_hypothesis_id/", "Loop/Highest_hypothesis_value/"],
+            "stats_values": [3.0, 0.5],
+        },
+        {"kind": "loop_closure", "from_id": "12", "to_id": "3", "score": 0.5, "frame_id": "f"},
+        T,
+    ),
+    "rtabmap_ros/msg/Info": (
+        {
+            "header": HEADER,
+            "refId": 12,
+            "loopClosureId": 0,
+            "proximityDetectionId": 4,
+            "statsKeys": [],
+            "statsValues": [],
+        },
+        {"kind": "proximity", "from_id": "12", "to_id": "4", "score": np.nan},
+        T,
+    ),
+    "visualization_msgs/msg/MarkerArray": (
+        {
+            "markers": [
+                {**NODE, "id": 1, "pose": {"position": {"x": 0.0, "y": 0.0, "z": 0.0}}},
+                {**NODE, "id": 9, "pose": {"position": {"x": 1.0, "y": 2.0, "z": 3.0}}},
+                {
+                    **NODE,
+                    "id": 0,
+                    "type": 5,
+                    "pose": POSE,
+                    "points": [XYZ, {"x": 0.0, "y": 0.0, "z": 0.0}],
+                },
+            ]
+        },
+        {"kind": "link", "from_id": "9", "to_id": "1", "from_xyz": [1, 2, 3], "number": 0},
+        T,
     ),
     "rosgraph_msgs/msg/Clock": ({"clock": STAMP}, {"clock_ns": T}, None),
     "rcl_interfaces/msg/Log": ({"stamp": STAMP, **LOG}, {"level": 4, "message": "text"}, T),

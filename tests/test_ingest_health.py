@@ -6,7 +6,7 @@ from payloads import read_back
 
 from slamreplay.geometry.times import NO_STAMP
 from slamreplay.ingest.pipeline import ingest
-from slamreplay.ingest.repeats import without_repeats
+from slamreplay.ingest.repeats import REPEATS
 from slamreplay.verdict.motion import protections
 
 SECOND = 10**9
@@ -38,10 +38,9 @@ def test_battery_states_and_what_the_current_says_where_they_are_unknown(logs):
     assert said(rows) == [
         ("battery", "discharging"), ("battery", "charging"), ("slot 2", "full"),
         ("battery", "unknown"), ("battery", "charging"), ("battery", "not charging"),
-        ("battery", "not charging"), ("battery", "not charging"),
     ]  # fmt: skip
     assert set(rows.columns["level"]) == {20}
-    assert (rows.t_sensor_ns // SECOND).tolist() == list(range(1, 9))
+    assert (rows.t_sensor_ns // SECOND).tolist() == list(range(1, 7))
 
 
 def test_of_states_the_changes_are_kept_and_the_others_counted(logs):
@@ -55,16 +54,13 @@ def test_of_states_the_changes_are_kept_and_the_others_counted(logs):
                 messages.append(logs.make(BATTERY, ros, location=place, **values))
         return messages
 
-    rows, _ = read_back(logs, BATTERY, make)
-    kept, losses = without_repeats(rows)
+    kept, told = read_back(logs, BATTERY, make)
 
     assert said(kept) == [
         ("battery", "discharging"), ("slot 2", "discharging"), ("slot 2", "charging"),
         ("slot 2", "discharging"),
     ]  # fmt: skip
-    assert [(x.kind, x.count, x.reason) for x in losses] == [
-        ("skipped", 8, "rows that repeat a state")
-    ]
+    assert told == {("skipped", REPEATS): 8}
 
 
 def parameter(logs, name, **value):
@@ -120,15 +116,14 @@ def test_parameters_of_ros_1_are_named_by_their_topic(logs):
             for value in (0.5, 0.7)
         ]  # fmt: skip
 
-    rows, _ = read_back(logs, CONFIG, make, topic="/laser/parameter_updates", ros=(1,))
-    kept, losses = without_repeats(rows)
+    kept, told = read_back(logs, CONFIG, make, topic="/laser/parameter_updates", ros=(1,))
 
     assert said(kept) == [
         ("/laser: on", "set to true"), ("/laser: skip", "set to 3"),
         ("/laser: port", "set to /dev/x"), ("/laser: max", "set to 0.5"),
         ("/laser: max", "set to 0.7"),
     ]  # fmt: skip
-    assert losses[0].count == 3
+    assert told == {("skipped", REPEATS): 3}
 
 
 def test_nodes_are_told_with_their_states(logs):

@@ -267,6 +267,24 @@ _SCHEMAS = (
         Column("value", "float64", doc="as recorded; its scale is the localizer's own"),
     ),
     _table(
+        "closures",
+        "closures of a SLAM system's graph, each when it was first told",
+        _FRAME,
+        Column(
+            "kind",
+            "str",
+            doc="loop_closure, proximity, landmark (rtabmap); inter_submap, "
+            "inter_trajectory (Cartographer); link of scans that do not follow each other, near "
+            "ones included (slam_toolbox)",
+        ),
+        Column("from_id", "str", doc="node, as the system counts; empty where it is not told"),
+        Column("to_id", "str", doc="node or landmark; empty where it is not told"),
+        Column("number", "int32", doc="place in the list of its kind that told it, from 0"),
+        Column("from_xyz", "float64", 3, "m", "frame_id", "NaN where it is not told"),
+        Column("to_xyz", "float64", 3, "m", "frame_id", "NaN where it is not told"),
+        Column("score", "float64", doc="value of the accepted hypothesis; NaN where none is told"),
+    ),
+    _table(
         "health",
         "diagnostics, log lines, parameters, states of nodes and batteries",
         Column("level", "int32", doc="as the message type counts; 20, info, where it has none"),

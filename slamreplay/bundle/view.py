@@ -176,6 +176,7 @@ ROLE_TABLES = {
     "magnetic_field": "magnetic_fields",
     "quality": "signals",
     "clock": "clock",
+    "closure": "closures",
     "recovery": "recoveries",
     "reference": "references",
     "map": "map_updates",

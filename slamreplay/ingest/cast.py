@@ -142,6 +142,7 @@ def _others(free: Callable[[str], list[TopicRows]]) -> dict[str, Choice | None]:
     simple = {
         "joints": ("joints", "sensor_msgs/JointState", ("joint_states",)),
         "magnetic_field": ("magnetic_fields", "sensor_msgs/MagneticField", ("mag",)),
+        "closure": ("closures", "closures of a SLAM system", ("info", "constraint_list")),
         "clock": ("clock", "rosgraph_msgs/Clock", ("clock",)),
         "quality": ("signals", "a localizer's word on itself", SCORES),
     }

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Sequence
 
 from slamreplay.ingest import DECODERS
-from slamreplay.ingest.names import is_quality
+from slamreplay.ingest.names import is_quality, is_slam_graph
 from slamreplay.ingest.readers.reader import Connection
 
 _SCORE = (is_quality, "by its name no localisation score")
@@ -19,6 +19,7 @@ _NAMED: dict[str, tuple[Callable[[str], bool], str]] = {
     "geometry_msgs/msg/Vector3Stamped": _SCORE,
     "autoware_internal_debug_msgs/msg/Float32Stamped": _SCORE,
     "tier4_debug_msgs/msg/Float32Stamped": _SCORE,
+    "visualization_msgs/msg/MarkerArray": (is_slam_graph, "by its name no SLAM graph"),
 }
 
 #: Message types that are known and have no rows, and why.

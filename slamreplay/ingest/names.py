@@ -82,6 +82,11 @@ def is_quality(topic: str) -> bool:
     return basename(topic) in SCORES or bool(words & _SCORED and words & _SCORERS)
 
 
+def is_slam_graph(topic: str) -> bool:
+    """Whether markers are called like a SLAM graph's: "constraint_list", "graph_visualization"."""
+    return bool({"graph", "constraint", "constraints"} & set(tokens(basename(topic))))
+
+
 def is_sensed_dock(topic: str) -> bool:
     """Nav2's `detected_dock_pose`: the dock as the robot sensed it, not where it should be."""
     words = tokens(basename(topic))

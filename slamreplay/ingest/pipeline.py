@@ -22,7 +22,7 @@ from slamreplay.ingest.overrides import check_topics, read_overrides
 from slamreplay.ingest.parts import missing_parts
 from slamreplay.ingest.readers.open_log import open_log
 from slamreplay.ingest.reference_file import read_reference
-from slamreplay.ingest.repeats import without_repeats
+from slamreplay.ingest.repeats import REPEATS, without_repeats
 from slamreplay.ingest.robots import refuse_mixture, topic_filter
 from slamreplay.ingest.roles import Choice
 from slamreplay.ingest.rows import TopicRows, read_rows
@@ -85,9 +85,10 @@ def _ingest(
         losses = [*losses, *lost]
     if options.robot is not None:
         topics = [without_prefix(t, options.robot.strip("/")) for t in topics]
-    for place, topic in enumerate(topics):
-        topics[place], repeats = without_repeats(topic)
-        lost += repeats
+    for place, topic in enumerate(topics):  # again, for a topic is decoded in parts
+        topics[place], count = without_repeats(topic)
+        if count:
+            lost.append(Loss(kind="skipped", what=topic.topic, count=count, reason=REPEATS))
     check_topics(overrides, sorted({t.topic for t in topics}), options.topics)
     cast = settle_cast(topics, overrides)
     layers = lay_out(cast, options.map)

@@ -1,27 +1,35 @@
-"""Rows that only say again what was said before: of states the changes are kept."""
+"""Rows that only say again what was said before: of states the changes are kept, of closures each.
+
+Some messages tell a whole state or a whole graph every time. Decoders read them as they are.
+"""
 
 from __future__ import annotations
+
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from slamreplay.bundle.manifest import Loss
-from slamreplay.ingest.rows import TopicRows
+if TYPE_CHECKING:
+    from slamreplay.ingest.rows import TopicRows
 
+#: What is said of them.
+REPEATS = "rows that repeat what was told before"
 #: Types that tell a whole state with every message, as health rows.
 _STATES = frozenset({"sensor_msgs/msg/BatteryState", "dynamic_reconfigure/msg/Config"})
 
 
-def without_repeats(topic: TopicRows) -> tuple[TopicRows, list[Loss]]:
+def without_repeats(topic: TopicRows) -> tuple[TopicRows, int]:
     """The topic's rows without repetitions, and how many those were."""
-    if topic.type not in _STATES:
-        return topic, []
-    keep = _changes(topic.columns["name"], topic.columns["message"])
+    columns = topic.columns
+    if topic.type in _STATES:
+        keep = _changes(columns["name"], columns["message"])
+    elif topic.table == "closures":
+        keep = _firsts(columns["kind"], columns["from_id"], columns["to_id"], columns["number"])
+    else:
+        return topic, 0
     repeats = int((~keep).sum())
-    if not repeats:
-        return topic, []
-    loss = Loss(kind="skipped", what=topic.topic, count=repeats, reason="rows that repeat a state")
-    return topic.take(np.flatnonzero(keep)), [loss]
+    return (topic.take(np.flatnonzero(keep)), repeats) if repeats else (topic, 0)
 
 
 def _changes(names: NDArray[np.object_], values: NDArray[np.object_]) -> NDArray[np.bool_]:
@@ -34,4 +42,24 @@ def _changes(names: NDArray[np.object_], values: NDArray[np.object_]) -> NDArray
     same = which[order][1:] == which[order][:-1]
     same &= values[order][1:] == values[order][:-1]
     keep[order[1:]] = ~same
+    return keep
+
+
+def _firsts(
+    kind: NDArray[np.object_],
+    from_id: NDArray[np.object_],
+    to_id: NDArray[np.object_],
+    number: NDArray[np.int32],
+) -> NDArray[np.bool_]:
+    """(N,) the first row of each closure, known by its ids or by its number among its kind.
+
+    Lists grow at their end; what comes after a system has thinned its graph may be taken for what
+    stood there before.
+    """
+    number = np.where(from_id == "", number, -1)
+    keep = np.zeros(len(kind), dtype=bool)
+    if len(kind):
+        parts = np.array([kind, from_id, to_id, number], dtype=str)
+        _, first = np.unique(parts, axis=1, return_index=True)
+        keep[first] = True
     return keep

@@ -18,6 +18,7 @@ from slamreplay.geometry.times import Times
 from slamreplay.ingest import DECODERS
 from slamreplay.ingest.decoders.decoder import Decoder, FieldError, Messages
 from slamreplay.ingest.readers.reader import Block, Connection, Reader
+from slamreplay.ingest.repeats import REPEATS, without_repeats
 from slamreplay.ingest.spill import MEMORY_BYTES, SpilledColumns
 from slamreplay.ingest.types import layouts
 from slamreplay.ingest.wire.read import read_messages
@@ -181,17 +182,21 @@ class _Topic:
             if remark.count:
                 key = (remark.kind, remark.reason)
                 self._remarks[key] = self._remarks.get(key, 0) + remark.count
-        return [
-            TopicRows(
-                self.connection.topic,
-                self.connection.type,
-                len(messages),
-                self._decoder.table,
-                decoded.columns,
-                np.asarray(decoded.t_sensor_ns, dtype=np.int64),
-                messages.t_log_ns[decoded.rows],
+        rows = TopicRows(
+            self.connection.topic,
+            self.connection.type,
+            len(messages),
+            self._decoder.table,
+            decoded.columns,
+            np.asarray(decoded.t_sensor_ns, dtype=np.int64),
+            messages.t_log_ns[decoded.rows],
+        )
+        rows, told_again = without_repeats(rows)
+        if told_again:
+            self._remarks["skipped", REPEATS] = (
+                self._remarks.get(("skipped", REPEATS), 0) + told_again
             )
-        ]
+        return [rows]
 
     def _lose(self, reason: str, t_log_ns: Times) -> None:
         count, first = self._broken.get(reason, (0, int(t_log_ns[0])))

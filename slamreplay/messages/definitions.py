@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from slamreplay.messages.drives import DRIVES
 from slamreplay.messages.signals import SIGNALS
+from slamreplay.messages.slam import SLAM
 from slamreplay.messages.tags import TAGS
 
 #: Type name ("package/msg/Name") to its fields, one per line.
@@ -116,6 +117,7 @@ DEFINITIONS: dict[str, str] = {
     "tf2_msgs/msg/TFMessage": "geometry_msgs/TransformStamped[] transforms\n",
     **DRIVES,
     **SIGNALS,
+    **SLAM,
     **TAGS,
 }
 
