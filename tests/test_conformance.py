@@ -107,6 +107,15 @@ DECODER_LINES = {
         {**PLACED, "covariance": [np.nan] * 36},
         T,
     ),
+    "nav2_msgs/srv/SetInitialPose_Event": (
+        {
+            "info": {"event_type": 1, "stamp": STAMP},
+            "request": [{"pose": {"header": HEADER, "pose": POSED}}],
+            "response": [],
+        },
+        {**PLACED, "covariance": COV36},
+        T,
+    ),
     "geometry_msgs/msg/PoseArray": (
         {"header": HEADER, "poses": [POSE, POSE]},
         {"xyyaw": [1, 2, YAW] * 2, "weights": []},

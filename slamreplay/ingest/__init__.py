@@ -28,6 +28,7 @@ DECODERS = Registry(
         "sensor_msgs/msg/PointCloud2": f"{_HERE}.point_cloud:POINT_CLOUD",
         "geometry_msgs/msg/PoseWithCovarianceStamped": f"{_HERE}.pose:POSE_WITH_COVARIANCE",
         "geometry_msgs/msg/PoseStamped": f"{_HERE}.pose:POSE",
+        "nav2_msgs/srv/SetInitialPose_Event": f"{_HERE}.set_initial_pose:SET_INITIAL_POSE",
         "geometry_msgs/msg/PoseArray": f"{_HERE}.particles:POSE_ARRAY",
         "nav2_msgs/msg/ParticleCloud": f"{_HERE}.particles:PARTICLE_CLOUD",
         "tf2_msgs/msg/TFMessage": f"{_HERE}.transforms:TRANSFORMS",

@@ -88,10 +88,9 @@ def settle_cast(topics: Sequence[TopicRows], overrides: Mapping[str, str]) -> Ca
         if frame != frames.map:
             frames, tf_rows, loss = without_frame(frame, topic, frames, tf_rows)
             losses.append(loss)
-    initial = [t for t in free("initial_pose") if roles.is_initial_pose(t)]
     found |= {
         "pose": roles.choose_pose([*free("pose"), *tf_rows], frames),
-        "initial_pose": roles.choose_simple(initial, "poses", "named as one", ("initialpose",)),
+        "initial_pose": roles.choose_initial_pose(free("initial_pose")),
         "points": roles.choose_simple(free("points"), "points", "point cloud", ("points",)),
         "plan": roles.choose_simple(free("plan"), "plans", "nav_msgs/Path", ("plan", "path")),
         "command": roles.choose_command(free("command")),
@@ -164,7 +163,7 @@ def _given(role: str, name: str, topics: Sequence[TopicRows]) -> Choice:
     table = ROLE_TABLES[role]
     fitting = {
         "references": ("poses", "odometry", "references"),
-        "initial_poses": ("poses",),
+        "initial_poses": ("poses", "initial_poses"),
         "poses": ("poses", "odometry", "transforms"),
         "map_updates": ("costmaps",),
         "commands": ("commands", "velocities"),

@@ -43,6 +43,8 @@ Rank = Callable[[TopicRows], tuple[object, ...]]
 def is_initial_pose(topic: TopicRows) -> bool:
     """A pose that was given to the localizer."""
     words = "".join(tokens(basename(topic.topic)))
+    if topic.table == "initial_poses":
+        return True
     return topic.table == "poses" and words.startswith(("initialpose", "setpose"))
 
 
@@ -182,6 +184,12 @@ def choose_recovery(topics: Sequence[TopicRows]) -> Choice | None:
     """Where recoveries would be told of; none having happened is an answer too."""
     found = [t for t in topics if t.table == "recoveries"]
     return _pick(found, lambda t: (len(t), t.messages), "recovery actions", "most of them")
+
+
+def choose_initial_pose(topics: Sequence[TopicRows]) -> Choice | None:
+    """Where poses were given to the localizer: a topic before calls of its service."""
+    found = [t for t in topics if len(t) and is_initial_pose(t)]
+    return _pick(found, _by_name("initialpose"), "named as one", "by name, then most messages")
 
 
 def is_command(topic: TopicRows) -> bool:

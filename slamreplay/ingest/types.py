@@ -10,6 +10,7 @@ from slamreplay.errors import LogError
 from slamreplay.ingest.readers.reader import Connection
 from slamreplay.ingest.wire.layout import Struct, UnknownLayoutError, layout_of
 from slamreplay.messages.definitions import DEFINITIONS, LATER_DEFINITIONS
+from slamreplay.messages.services import as_message, event_definition
 
 if TYPE_CHECKING:
     from rosbags.interfaces.typing import Typesdict
@@ -30,10 +31,11 @@ def layouts(connection: Connection) -> list[Struct]:
     """
     if connection.encoding not in {"ros1", "cdr"}:
         raise LogError(f"messages are encoded as '{connection.encoding or 'unknown'}'")
-    name, encoding = connection.type, connection.encoding
+    name, encoding = as_message(connection.type), connection.encoding
+    text = event_definition(connection.type, connection.definition)
     try:
-        if connection.definition:
-            own = _own(encoding, name, connection.definition_format, connection.definition)
+        if text:
+            own = _own(encoding, name, connection.definition_format, text)
             return [layout_of(name, own)]
         found = [
             layout_of(name, _with_needed({}, name, encoding, later=later))
