@@ -18,12 +18,6 @@ def basename(name: str) -> str:
     return name.rstrip("/").rpartition("/")[2].lower()
 
 
-def namespace(topic: str) -> str:
-    """The first part of a topic that has several: "/robot1/odom" gives "robot1", "/odom" ""."""
-    first, _, rest = topic.strip("/").partition("/")
-    return first if rest else ""
-
-
 def is_map_frame(frame: str) -> bool:
     """REP-105's map, in whatever namespace; also the `map` part of longer names."""
     return "map" in tokens(basename(frame))
