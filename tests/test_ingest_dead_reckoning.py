@@ -10,6 +10,7 @@ from slamreplay.bundle.belief import recorded_belief
 from slamreplay.bundle.odometry import odometry_track
 from slamreplay.geometry import se2
 from slamreplay.ingest.dead_reckoning import integrate
+from slamreplay.ingest.options import IngestOptions
 from slamreplay.ingest.pipeline import ingest
 
 SECOND = 10**9
@@ -153,6 +154,71 @@ def test_velocities_along_axes_of_the_world_lead_nowhere(logs, twists, tmp_path,
     assert "odometry" in bundle.manifest.missing_parts()
     reason = "not dead-reckoned: along axes of the world, and no heading is known"
     assert losses(bundle)["skipped", "/wheel_twist", reason] == 30
+
+
+def twists_of(logs, twists, velocity, turn_rate, steps=60):
+    """Twists whose linear part is a function of the step and the heading."""
+    out = twists.messages(range(steps))
+    for _topic, kind, message, t in out:
+        if kind == STAMPED:
+            step = (t - EPOCH) // (SECOND // 10)
+            x, y, z = velocity(step, turn_rate * 0.1 * step)
+            linear = message.twist.linear
+            linear.x, linear.y, linear.z = float(x), float(y), float(z)
+            message.twist.angular.z = float(turn_rate)
+    return out
+
+
+def back_and_forth(step, heading):
+    return 0.5 * (-1) ** (step // 20), 0.0, 0.0
+
+
+@pytest.mark.parametrize(
+    ("velocity", "turn_rate", "said"),
+    [
+        (lambda _, a: (0.5 * np.cos(a + 1.0), 0.5 * np.sin(a + 1.0), 0.0), 0.8, "turns with"),
+        (lambda s, _: (0.5 * np.cos(s / 9), 0.5 * np.sin(s / 9), 0.0), 0.0, "tell no turn rate"),
+        (lambda *_: (0.5, 0.0, 0.4), 0.1, "leave the plane"),
+        (lambda *_: (0.5, 0.0, 0.02), 0.1, None),
+        (back_and_forth, 0.8, None),
+        (lambda *_: (0.0, 0.5, 0.0), 0.8, None),
+        (lambda s, _: (0.5 * np.cos(s / 9), 0.5 * np.sin(s / 9), 0.0), 0.8, None),
+        (lambda *_: (0.0, 0.0, 0.0), 0.8, None),
+    ],
+    ids=["world", "receiver", "flying", "bumpy", "back and forth", "sideways", "omni", "at rest"],
+)
+def test_velocities_that_are_no_bases_are_told_by_what_they_are(
+    logs, twists, tmp_path, velocity, turn_rate, said
+):
+    bundle = bundle_of(logs, tmp_path, twists_of(logs, twists, velocity, turn_rate))
+
+    found = [x.reason for x in bundle.manifest.losses if x.what == "/wheel_twist"]
+    assert (MADE[2] in found) == (said is None)
+    assert [r for r in found if "not dead-reckoned" in r and (said or "-") in r] == (
+        [] if said is None else found
+    )
+
+
+def test_a_command_is_dead_reckoned_where_the_user_says_that_it_was_measured(
+    logs, twists, tmp_path
+):
+    messages = [(t.replace("wheel_twist", "cmd_vel"), *rest) for t, *rest in twists.messages()]
+    log = logs.write("log.mcap", messages)
+    topics = tmp_path / "topics.yaml"
+    topics.write_text("velocity: /cmd_vel\n")
+
+    plain = ingest([log], tmp_path / "a")
+    told = ingest([log], tmp_path / "b", IngestOptions(topics=topics))
+
+    assert "odometry" in plain.manifest.missing_parts()
+    assert "odometry" not in told.manifest.missing_parts()
+
+
+def test_an_inertial_unit_on_a_bench_is_no_odometry(real_logs, tmp_path):
+    bundle = ingest([real_logs / "fixtures/tilt_laser.bag"], tmp_path / "b")
+
+    assert "odometry" in bundle.manifest.missing_parts()
+    assert losses(bundle)["skipped", "/velocity", "not dead-reckoned: they leave the plane"] == 712
 
 
 def test_corrections_of_an_odom_that_was_not_recorded_are_not_mixed_with_it(logs, twists, tmp_path):

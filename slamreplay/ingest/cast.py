@@ -9,7 +9,7 @@ from slamreplay.bundle.manifest import FrameEdge, Frames, Loss
 from slamreplay.bundle.view import ROLE_TABLES
 from slamreplay.errors import UsageError
 from slamreplay.ingest import roles
-from slamreplay.ingest.dead_reckoning import dead_reckoned, is_carried, is_in_body
+from slamreplay.ingest.dead_reckoning import dead_reckoned, is_carried, objection
 from slamreplay.ingest.doubles import without_doubles
 from slamreplay.ingest.frames import direct_pose, find_frames, settle, without_frame
 from slamreplay.ingest.lasers import second_scan
@@ -122,15 +122,19 @@ def _dead_reckoned(
     if is_carried(tree, frames):
         return None, []
     given = found.get("velocity")
-    velocity = given or roles.choose_velocity([t for t in topics if is_in_body(t)])
-    if velocity is None or not is_in_body(velocity.rows):
-        velocity = velocity or roles.choose_velocity(topics)
-        if velocity is None:
-            return None, []
-        reason = "not dead-reckoned: along axes of the world, and no heading is known"
-        rows = velocity.rows
-        return None, [Loss(kind="skipped", what=rows.topic, count=len(rows), reason=reason)]
-    rows = moved(velocity.rows, "velocities")
+    velocities = [
+        t for t in topics if t.table == "velocities" and len(t) and not roles.is_command(t)
+    ]
+    if given is not None:
+        velocities = [moved(given.rows, "velocities")]
+    against = {id(t): objection(t) for t in velocities}
+    velocity = roles.best_velocity([t for t in velocities if against[id(t)] is None])
+    if velocity is None:
+        return None, [
+            Loss(kind="skipped", what=t.topic, count=len(t), reason=f"not dead-reckoned: {why}")
+            for t in velocities if (why := against[id(t)])
+        ]  # fmt: skip
+    rows = velocity.rows
     made, losses = dead_reckoned(rows, tree, frames.base)
     reason = f"dead-reckoned from the velocities of {roles.type_name(rows.type)}"
     return Choice(made, reason), losses

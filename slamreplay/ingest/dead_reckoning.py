@@ -22,15 +22,46 @@ from slamreplay.ingest.rows import TopicRows
 #: A pause between twists that is longer than this is not bridged: nothing says what the robot did.
 GAP_NS = NS_PER_S
 _WORLD = frozenset({"world", "earth", "enu", "ned"})
+#: Slower than this is noise of rest; vertical motion above this share of the whole is no base's.
+_MOVING_M_S, _VERTICAL = 0.1, 0.3
+#: Directions whose resultant is above the one point one way, below the other they do not.
+_ONE_WAY, _ANY_WAY, _FEWEST = 0.9, 0.7, 20
 
 
-def is_in_body(topic: TopicRows) -> bool:
-    """Whether a topic's velocities are along axes that turn with the robot.
+def objection(topic: TopicRows) -> str | None:
+    """Why a topic's velocities lead nowhere, None where they do.
 
-    Along axes of the world they lead nowhere without a heading.
+    Receivers and inertial units tell velocities along axes of the world, some in a frame that is
+    called the robot's. There the direction of motion turns with the heading; along a base's own
+    axes it stays, forwards and backwards, be the base turned as it may.
     """
     frame = topic.frame()
-    return not (is_map_frame(frame) or is_odom_frame(frame) or basename(frame) in _WORLD)
+    if is_map_frame(frame) or is_odom_frame(frame) or basename(frame) in _WORLD:
+        return "along axes of the world, and no heading is known"
+    linear = topic.columns["linear_velocity_xyz"]
+    across = np.sqrt(np.mean(np.sum(linear[:, :2] ** 2, axis=1)))
+    up = np.sqrt(np.mean(linear[:, 2] ** 2))
+    if up > _MOVING_M_S and up > _VERTICAL * np.hypot(across, up):
+        return "they leave the plane"
+    order, t_ns = _in_order(topic)
+    twist = _planar(topic.take(order))
+    moving = np.hypot(twist[:, 0], twist[:, 1]) > _MOVING_M_S
+    if moving.sum() < _FEWEST:
+        return None
+    along = np.arctan2(twist[moving, 1], twist[moving, 0])
+    heading = integrate(t_ns, twist)[moving, 2]
+    if _resultant(along) > _ANY_WAY:
+        return None
+    if not twist[:, 2].any():
+        return "they tell no turn rate, and their direction changes"
+    if _resultant(along - heading) > _ONE_WAY:
+        return "their direction turns with the heading, as along axes of the world"
+    return None
+
+
+def _resultant(angle: NDArray[np.float64]) -> float:
+    """Mean resultant length of axes (N,) in rad, 0 to 1: forwards and backwards are one."""
+    return float(np.abs(np.mean(np.exp(2.0j * angle))))
 
 
 def is_carried(tree: Sequence[FrameEdge], frames: Frames) -> bool:

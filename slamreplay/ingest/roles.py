@@ -208,7 +208,13 @@ def choose_command(topics: Sequence[TopicRows]) -> Choice | None:
 
 def choose_velocity(topics: Sequence[TopicRows]) -> Choice | None:
     """The measured velocity that tells most often; one with a covariance first."""
-    found = [t for t in topics if t.table == "velocities" and len(t) and not is_command(t)]
+    return best_velocity(
+        [t for t in topics if t.table == "velocities" and len(t) and not is_command(t)]
+    )
+
+
+def best_velocity(found: Sequence[TopicRows]) -> Choice | None:
+    """Of topics that are known to be measured velocities."""
 
     def rank(t: TopicRows) -> tuple[object, ...]:
         return (bool(np.isfinite(t.columns["twist_covariance"]).all(axis=1).any()), t.messages)
