@@ -1,9 +1,11 @@
 """Messages as a log holds them: serialised by rosbags, read back by ingest."""
 
+from itertools import accumulate, pairwise
+
 import numpy as np
 
 from slamreplay.bundle.tables import Ragged
-from slamreplay.ingest.readers.reader import Connection
+from slamreplay.ingest.readers.reader import Block, Connection
 from slamreplay.ingest.rows import read_rows
 
 
@@ -12,13 +14,18 @@ class Container:
 
     sources = ()
 
-    def __init__(self, topic, kind, payloads, encoding):
+    def __init__(self, topic, kind, payloads, encoding, *, at_once=10**9):
+        self._at_once = at_once  # messages in a block
         self.connections = (Connection(0, topic, kind, encoding, "", "msg", len(payloads)),)
         self.losses = []
         self._payloads = payloads
 
-    def messages(self, wanted):
-        yield from ((0, 10 * (k + 1), payload) for k, payload in enumerate(self._payloads))
+    def blocks(self, wanted):
+        if 0 in wanted:
+            ends = [0, *accumulate(len(payload) for payload in self._payloads)]
+            found = [(0, a, b, 10 * (k + 1)) for k, (a, b) in enumerate(pairwise(ends))]
+            for k in range(0, len(found), self._at_once):
+                yield Block.of(b"".join(self._payloads), found[k : k + self._at_once])
 
 
 def read_back(logs, kind, make, *, topic="/topic", ros=(1, 2)):

@@ -161,16 +161,15 @@ def test_constraints_of_cartographer_have_places_and_no_ids(logs):
     }  # fmt: skip
 
 
-def test_parts_that_a_topic_is_decoded_in_make_no_difference(logs, monkeypatch):
+def test_parts_that_a_topic_is_decoded_in_make_no_difference(logs):
     def make(ros):
         pairs = [((k, 0.0), (k, 1.0)) for k in (1.0, 2.0)]
         return [cartographer(logs, ros, pairs[: 1 + k // 2], []) for k in range(4)]
 
     whole, _ = read_back(logs, ARRAY, make)
-    monkeypatch.setattr(rows_module, "_BATCH_BYTES", 1)
     store = logs.stores[2]
     payloads = [bytes(store.serialize_cdr(m, ARRAY)) for m in make(2)]
-    container = Container("/topic", ARRAY, payloads, "cdr")
+    container = Container("/topic", ARRAY, payloads, "cdr", at_once=1)
     (parts,), _ = rows_module.read_rows([container], lambda _: None, None)
     joined, _ = rows_module.without_repeats(parts)
 

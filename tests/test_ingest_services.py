@@ -8,7 +8,8 @@ from slamreplay.ingest.pipeline import ingest
 from slamreplay.ingest.readers.open_log import open_log
 from slamreplay.ingest.readers.reader import Connection
 from slamreplay.ingest.rows import read_rows
-from slamreplay.ingest.types import deserialiser
+from slamreplay.ingest.types import layouts
+from slamreplay.ingest.wire.read import read_messages
 from slamreplay.messages.services import event_definition
 
 SECOND = 10**9
@@ -124,12 +125,18 @@ def test_real_events_are_read_to_their_last_byte(real_logs):
     with open_log([path]) as (readers, _):
         (reader,) = readers
         events = {c.index: c for c in reader.connections if c.type.endswith("_Event")}
-        read = [(events[i].topic, deserialiser(events[i])(data))
-                for i, _, data in reader.messages(set(events))]  # fmt: skip
+        found = []
+        for block in reader.blocks(set(events)):
+            for number, connection in events.items():
+                own = np.flatnonzero(block.connection == number)
+                if len(own):
+                    places = (block.start[own], block.end[own], block.t_log_ns[own])
+                    of = (connection.topic, layouts(connection), "cdr")
+                    found += [m for m, _ in read_messages(block.data, *places, *of)]
 
-    assert len(read) == 8
-    for topic in {name for name, _ in read}:
-        own = [message for name, message in read if name == topic]
-        assert [m.info.event_type for m in own] == [0, 3, 0, 3]
-        assert [(len(m.request), len(m.response)) for m in own] == [(1, 0), (0, 1)] * 2
-        assert np.ptp([m.info.stamp.sec for m in own]) <= 1
+    assert sum(len(m) for m in found) == 8
+    for messages in found:
+        assert messages.column("info.event_type", int).tolist() == [0, 3, 0, 3]
+        (_, asked), (_, answered) = messages.children("request"), messages.children("response")
+        assert (asked.tolist(), answered.tolist()) == ([0, 2], [1, 3])
+        assert np.ptp(messages.column("info.stamp.sec", int)) <= 1

@@ -124,6 +124,9 @@ def assert_same_field(messages, values, node, at):
     else:
         children, rows = messages.children(at)
         assert rows.tolist() == [k for k, v in enumerate(values) for _ in v]
+        if isinstance(node.element, Text):
+            ragged = messages.ragged(at, object)
+            assert [list(ragged[k]) for k in range(len(values))] == [list(v) for v in values]
         assert_same_field(children, [e for v in values for e in v], node.element, "")
 
 
