@@ -16,7 +16,7 @@ from slamreplay.bundle.tables import Ragged, concatenated
 from slamreplay.errors import LogError
 from slamreplay.geometry.times import Times
 from slamreplay.ingest import DECODERS
-from slamreplay.ingest.decoders.decoder import Decoder, FieldError, Messages
+from slamreplay.ingest.decoders.decoder import Decoded, Decoder, FieldError, Messages
 from slamreplay.ingest.readers.reader import Block, Connection, Reader
 from slamreplay.ingest.repeats import REPEATS, without_repeats
 from slamreplay.ingest.spill import MEMORY_BYTES, SpilledColumns
@@ -182,21 +182,24 @@ class _Topic:
             if remark.count:
                 key = (remark.kind, remark.reason)
                 self._remarks[key] = self._remarks.get(key, 0) + remark.count
+        return [self._table_rows(part, messages) for part in (decoded, *decoded.also)]
+
+    def _table_rows(self, part: Decoded, messages: Messages) -> TopicRows:
         rows = TopicRows(
             self.connection.topic,
             self.connection.type,
             len(messages),
-            self._decoder.table,
-            decoded.columns,
-            np.asarray(decoded.t_sensor_ns, dtype=np.int64),
-            messages.t_log_ns[decoded.rows],
+            part.table or self._decoder.table,
+            part.columns,
+            np.asarray(part.t_sensor_ns, dtype=np.int64),
+            messages.t_log_ns[part.rows],
         )
         rows, told_again = without_repeats(rows)
         if told_again:
             self._remarks["skipped", REPEATS] = (
                 self._remarks.get(("skipped", REPEATS), 0) + told_again
             )
-        return [rows]
+        return rows
 
     def _lose(self, reason: str, t_log_ns: Times) -> None:
         count, first = self._broken.get(reason, (0, int(t_log_ns[0])))
@@ -213,13 +216,13 @@ class Store:
     def __init__(self, folder: Path | None) -> None:
         self._folder = folder
         self._held = 0
-        self._parts: dict[tuple[str, str], list[TopicRows]] = {}
-        self._columns: dict[tuple[str, str], SpilledColumns] = {}
+        self._parts: dict[tuple[str, str, str], list[TopicRows]] = {}
+        self._columns: dict[tuple[str, str, str], SpilledColumns] = {}
 
     def add(self, parts: Sequence[TopicRows]) -> None:
         """Rows of one topic, after those that are there."""
         for part in parts:
-            key = (part.topic, part.type)
+            key = (part.topic, part.type, part.table)
             self._parts.setdefault(key, []).append(part)
             self._held += part.nbytes
             if key in self._columns:
@@ -233,7 +236,7 @@ class Store:
         """One set of rows for each topic and type, sorted by these."""
         return [_joined(self._parts.pop(key)) for key in sorted(self._parts)]
 
-    def _spill(self, key: tuple[str, str]) -> None:
+    def _spill(self, key: tuple[str, str, str]) -> None:
         """Put a topic's columns on disk; they stand for all its parts from then on."""
         parts = self._parts[key]
         if key not in self._columns and self._folder is not None:
