@@ -54,6 +54,23 @@ SCAN = {**ANGLES, "scan_time": 0.5, "range_min": 0.1, "range_max": 9.0, "intensi
 IMU = {"orientation": TURN, "angular_velocity": XYZ, "linear_acceleration": XYZ}
 IMU_COV = {f"{name}_covariance": COV9 for name in IMU}
 ERRORS = {"image_error": 0.1, "object_error": 0.1, "fiducial_area": 9.0}
+PLAIN_STAMP = {"timestamp": STAMP, "frame_id": "/f"}
+FOX_EDGE = {
+    "timestamp": STAMP,
+    "parent_frame_id": "/f",
+    "child_frame_id": "c",
+    "translation": XYZ,
+    "rotation": TURN,
+}
+FOX_FIX = {
+    **PLAIN_STAMP,
+    "latitude": 48.0,
+    "longitude": 0.0,
+    "altitude": 3.0,
+    "position_covariance": COV9,
+    "position_covariance_type": 0,
+}
+FOX_FIX_ROW = {"frame_id": "earth", "child_frame_id": "f", "kind": "gnss"}
 VELOCITY = {"linear_velocity_xyz": [1, 2, 3], "angular_velocity_xyz": [4, 5, 6]}
 MARKER = {"header": HEADER, "id": 7, "pose": POSED, "confidence": 1.0}
 NODE = {"header": HEADER, "ns": "slam_toolbox", "type": 2, "action": 0, "points": []}
@@ -380,6 +397,38 @@ DECODER_LINES = {
     "rosgraph_msgs/msg/Clock": ({"clock": STAMP}, {"clock_ns": T}, None),
     "rcl_interfaces/msg/Log": ({"stamp": STAMP, **LOG}, {"level": 4, "message": "text"}, T),
     "rosgraph_msgs/msg/Log": ({"header": HEADER, **LOG}, {"level": 4, "message": "text"}, T),
+    "foxglove_msgs/msg/PoseInFrame": (
+        {**PLAIN_STAMP, "pose": POSE},
+        {**PLACED, "covariance": [np.nan] * 36},
+        T,
+    ),
+    "foxglove_msgs/msg/PosesInFrame": (
+        {**PLAIN_STAMP, "poses": [POSE, POSE]},
+        {"xyyaw": [1, 2, YAW] * 2, "weights": [], "frame_id": "f"},
+        T,
+    ),
+    "foxglove_msgs/msg/FrameTransform": (FOX_EDGE, EDGE, T),
+    "foxglove_msgs/msg/FrameTransforms": ({"transforms": [FOX_EDGE]}, EDGE, T),
+    "foxglove_msgs/msg/Odometry": (
+        {
+            **PLAIN_STAMP,
+            "body_frame_id": "/b",
+            "pose": POSE,
+            "linear_velocity": XYZ,
+            "angular_velocity": TWIST["angular"],
+            "pose_covariance": COV36,
+            "velocity_covariance": COV36,
+        },
+        {**PLACED, **VELOCITY, "child_frame_id": "b", "twist_covariance": COV36},
+        T,
+    ),
+    "foxglove_msgs/msg/LocationFix": (FOX_FIX, FOX_FIX_ROW, T),
+    "foxglove_msgs/msg/LocationFixes": ({"fixes": [FOX_FIX]}, FOX_FIX_ROW, T),
+    "foxglove_msgs/msg/Log": (
+        {"timestamp": STAMP, "level": 4, "name": "n", "message": "text"},
+        {"level": 4, "name": "n", "message": "text"},
+        T,
+    ),
 }
 
 

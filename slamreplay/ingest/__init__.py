@@ -74,5 +74,13 @@ DECODERS = Registry(
         "rosgraph_msgs/msg/Clock": f"{_HERE}.clock:CLOCK",
         "rcl_interfaces/msg/Log": f"{_HERE}.health:LOG",
         "rosgraph_msgs/msg/Log": f"{_HERE}.health:LOG",
+        "foxglove_msgs/msg/PoseInFrame": f"{_HERE}.foxglove:POSE_IN_FRAME",
+        "foxglove_msgs/msg/PosesInFrame": f"{_HERE}.foxglove:POSES_IN_FRAME",
+        "foxglove_msgs/msg/FrameTransform": f"{_HERE}.foxglove:FRAME_TRANSFORM",
+        "foxglove_msgs/msg/FrameTransforms": f"{_HERE}.foxglove:FRAME_TRANSFORMS",
+        "foxglove_msgs/msg/Odometry": f"{_HERE}.foxglove:ODOMETRY",
+        "foxglove_msgs/msg/LocationFix": f"{_HERE}.foxglove:LOCATION_FIX",
+        "foxglove_msgs/msg/LocationFixes": f"{_HERE}.foxglove:LOCATION_FIXES",
+        "foxglove_msgs/msg/Log": f"{_HERE}.foxglove:LOG",
     },
 )

@@ -98,3 +98,9 @@ _DOCKING = {
 def why_no_dock(topic: str) -> str | None:
     """Why a pose of the docking server is no sighting of the dock; None for other topics."""
     return _DOCKING.get(basename(topic))
+
+
+def is_path(topic: str) -> bool:
+    """Whether a topic's name says that its poses follow each other: "/plan", "/robot1/path"."""
+    named = {"plan", "plans", "path", "paths", "trajectory", "route", "waypoints"}
+    return bool(named & set(tokens(topic)))

@@ -13,6 +13,7 @@ UbiquityRobotics/fiducials, magazino/move_base_flex.
 from __future__ import annotations
 
 from slamreplay.messages.drives import DRIVES
+from slamreplay.messages.foxglove import FOXGLOVE_DEFINITIONS
 from slamreplay.messages.services import SERVICES
 from slamreplay.messages.signals import SIGNALS
 from slamreplay.messages.slam import SLAM
@@ -117,6 +118,7 @@ DEFINITIONS: dict[str, str] = {
     "tf/msg/tfMessage": "geometry_msgs/TransformStamped[] transforms\n",
     "tf2_msgs/msg/TFMessage": "geometry_msgs/TransformStamped[] transforms\n",
     **DRIVES,
+    **FOXGLOVE_DEFINITIONS,
     **SERVICES,
     **SIGNALS,
     **SLAM,
