@@ -72,6 +72,7 @@ FOX_FIX = {
 }
 FOX_FIX_ROW = {"frame_id": "earth", "child_frame_id": "f", "kind": "gnss"}
 UNTURNED = {"position": {"x": 0.0, "y": 0.0, "z": 0.0}, "orientation": dict.fromkeys("xyzw", 0.0)}
+PACKED = [{"name": n, "offset": 4 * k, "type": 7} for k, n in enumerate("xyz")]
 VELOCITY = {"linear_velocity_xyz": [1, 2, 3], "angular_velocity_xyz": [4, 5, 6]}
 MARKER = {"header": HEADER, "id": 7, "pose": POSED, "confidence": 1.0}
 NODE = {"header": HEADER, "ns": "slam_toolbox", "type": 2, "action": 0, "points": []}
@@ -432,6 +433,17 @@ DECODER_LINES = {
             "ranges": [1.0, float("inf"), 4.0],
         },
         {"ranges_m": [1, np.inf, 4], "angle_increment_rad": 1, "range_max_m": 4, "frame_id": "f"},
+        T,
+    ),
+    "foxglove_msgs/msg/PointCloud": (
+        {
+            **PLAIN_STAMP,
+            "pose": UNTURNED,
+            "point_stride": 12,
+            "fields": PACKED,
+            "data": XYZ_BYTES,
+        },
+        {"points_xyz": [1, 2, 3], "frame_id": "f"},
         T,
     ),
     "foxglove_msgs/msg/LocationFix": (FOX_FIX, FOX_FIX_ROW, T),
