@@ -446,6 +446,20 @@ DECODER_LINES = {
         {"points_xyz": [1, 2, 3], "frame_id": "f"},
         T,
     ),
+    "foxglove_msgs/msg/Grid": (
+        {
+            **PLAIN_STAMP,
+            "pose": POSE,
+            "column_count": 2,
+            "cell_size": {"x": 0.5, "y": 0.5},
+            "row_stride": 5,
+            "cell_stride": 2,
+            "fields": [{"name": "occupancy", "offset": 1, "type": 1}],
+            "data": [7, 0, 7, 100, 7, 7, 255, 7, 65, 7],
+        },
+        {"cells": [0, 100, -1, 65], "width": 2, "height": 2, "origin_xyyaw": [1, 2, YAW]},
+        T,
+    ),
     "foxglove_msgs/msg/LocationFix": (FOX_FIX, FOX_FIX_ROW, T),
     "foxglove_msgs/msg/LocationFixes": ({"fixes": [FOX_FIX]}, FOX_FIX_ROW, T),
     "foxglove_msgs/msg/Log": (

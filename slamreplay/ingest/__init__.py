@@ -81,6 +81,7 @@ DECODERS = Registry(
         "foxglove_msgs/msg/Odometry": f"{_HERE}.foxglove:ODOMETRY",
         "foxglove_msgs/msg/LaserScan": f"{_HERE}.foxglove_scan:LASER_SCAN",
         "foxglove_msgs/msg/PointCloud": f"{_HERE}.foxglove_points:POINT_CLOUD",
+        "foxglove_msgs/msg/Grid": f"{_HERE}.foxglove_grid:GRID",
         "foxglove_msgs/msg/LocationFix": f"{_HERE}.foxglove:LOCATION_FIX",
         "foxglove_msgs/msg/LocationFixes": f"{_HERE}.foxglove:LOCATION_FIXES",
         "foxglove_msgs/msg/Log": f"{_HERE}.foxglove:LOG",
