@@ -6,7 +6,7 @@ import numpy as np
 
 from slamreplay.bundle.tables import Ragged
 from slamreplay.ingest.readers.reader import Block, Connection
-from slamreplay.ingest.rows import read_rows
+from slamreplay.ingest.reading import read_rows
 
 
 class Container:

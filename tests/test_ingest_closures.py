@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from payloads import Container, read_back
 
-from slamreplay.ingest import rows as rows_module
 from slamreplay.ingest.pipeline import ingest
-from slamreplay.ingest.repeats import REPEATS
+from slamreplay.ingest.reading import read_rows
+from slamreplay.ingest.repeats import REPEATS, without_repeats
 
 SECOND = 10**9
 EPOCH = 1_700_000_000 * SECOND
@@ -170,8 +170,8 @@ def test_parts_that_a_topic_is_decoded_in_make_no_difference(logs):
     store = logs.stores[2]
     payloads = [bytes(store.serialize_cdr(m, ARRAY)) for m in make(2)]
     container = Container("/topic", ARRAY, payloads, "cdr", at_once=1)
-    (parts,), _ = rows_module.read_rows([container], lambda _: None, None)
-    joined, _ = rows_module.without_repeats(parts)
+    (parts,), _ = read_rows([container], lambda _: None, None)
+    joined, _ = without_repeats(parts)
 
     assert len(parts) > len(whole)
     assert joined.t_log_ns.tolist() == whole.t_log_ns.tolist() == [10, 30]

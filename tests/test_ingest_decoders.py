@@ -266,7 +266,7 @@ def test_behavior_tree_log_with_uid_is_read_from_its_own_definition(logs):
     path = logs.write("bt.mcap", [("/bt", "nav2_msgs/msg/BehaviorTreeLog", log, 1)])
 
     from slamreplay.ingest.readers.open_log import open_log
-    from slamreplay.ingest.rows import read_rows
+    from slamreplay.ingest.reading import read_rows
 
     with open_log([path]) as (readers, _):
         (topic,), losses = read_rows(readers, lambda _topic: None, None)

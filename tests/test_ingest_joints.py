@@ -50,7 +50,7 @@ def test_a_magnetic_covariance_of_zeros_is_not_known(logs):
 
 def test_wheels_of_a_real_robot_are_read_to_the_last_joint(real_logs):
     from slamreplay.ingest.readers.open_log import open_log
-    from slamreplay.ingest.rows import read_rows
+    from slamreplay.ingest.reading import read_rows
 
     with open_log([real_logs / "fixtures/turtlebot3_no_tf.bag"]) as (readers, _):
         rows, _ = read_rows(readers, lambda t: None if t == "/joint_states" else "not asked", None)

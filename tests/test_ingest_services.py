@@ -7,7 +7,7 @@ from payloads import Container
 from slamreplay.ingest.pipeline import ingest
 from slamreplay.ingest.readers.open_log import open_log
 from slamreplay.ingest.readers.reader import Connection
-from slamreplay.ingest.rows import read_rows
+from slamreplay.ingest.reading import read_rows
 from slamreplay.ingest.types import layouts
 from slamreplay.ingest.wire.read import read_messages
 from slamreplay.messages.services import event_definition

@@ -101,7 +101,7 @@ def test_newer_markers_with_corners_are_read_by_their_own_definition(logs):
     path = logs.write("m.mcap", [("/marker", ARUCO, marker, 1)])
 
     from slamreplay.ingest.readers.open_log import open_log
-    from slamreplay.ingest.rows import read_rows
+    from slamreplay.ingest.reading import read_rows
 
     with open_log([path]) as (readers, _):
         (rows,), losses = read_rows(readers, lambda _topic: None, None)

@@ -21,11 +21,12 @@ from slamreplay.ingest.options import IngestOptions
 from slamreplay.ingest.overrides import check_topics, read_overrides
 from slamreplay.ingest.parts import missing_parts
 from slamreplay.ingest.readers.open_log import open_log
+from slamreplay.ingest.reading import read_rows
 from slamreplay.ingest.reference_file import read_reference
 from slamreplay.ingest.repeats import REPEATS, without_repeats
 from slamreplay.ingest.robots import in_its_frames, refuse_mixture, topic_filter
 from slamreplay.ingest.roles import Choice
-from slamreplay.ingest.rows import TopicRows, read_rows
+from slamreplay.ingest.rows import TopicRows
 from slamreplay.ingest.span import clock_between, cut, evidence_span
 from slamreplay.ingest.tables import build
 from slamreplay.ingest.text_logs import read_text_log

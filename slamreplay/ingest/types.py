@@ -27,10 +27,8 @@ def layouts(connection: Connection) -> list[Struct]:
     every layout that a type has had.
 
     Raises:
-        LogError: the encoding is unknown here, or the type has no (readable) definition.
+        LogError: the type has no (readable) definition.
     """
-    if connection.encoding not in {"ros1", "cdr"}:
-        raise LogError(f"messages are encoded as '{connection.encoding or 'unknown'}'")
     name, encoding = as_message(connection.type), connection.encoding
     text = event_definition(connection.type, connection.definition)
     try:
@@ -47,6 +45,13 @@ def layouts(connection: Connection) -> list[Struct]:
     if not found:
         raise LogError("the log has no definition of this type, and neither do we")
     return found if found[0] != found[-1] else found[:1]
+
+
+def shipped(name: str, encoding: str) -> Mapping[str, Any] | None:
+    """Definitions of a type and those in it that need no log, by name; None of an unknown type."""
+    if _shipped(name, encoding, later=False) is None:
+        return None
+    return _with_needed({}, name, encoding, later=False)
 
 
 @cache
