@@ -92,7 +92,7 @@ def settle_cast(topics: Sequence[TopicRows], overrides: Mapping[str, str]) -> Ca
         "pose": roles.choose_pose([*free("pose"), *tf_rows], frames),
         "initial_pose": roles.choose_initial_pose(free("initial_pose")),
         "points": roles.choose_simple(free("points"), "points", "point cloud", ("points",)),
-        "plan": roles.choose_simple(free("plan"), "plans", "nav_msgs/Path", ("plan", "path")),
+        "plan": roles.choose_simple(free("plan"), "plans", None, ("plan", "path")),
         "command": roles.choose_command(free("command")),
         "velocity": roles.choose_velocity(free("velocity")),
         **_others(free),

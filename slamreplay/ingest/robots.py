@@ -13,10 +13,11 @@ from slamreplay.ingest.readers.reader import Connection
 from slamreplay.ingest.rows import TopicRows
 from slamreplay.ingest.tables import without_prefix
 
-_ODOMETRY = "nav_msgs/msg/Odometry"
-_LASERS = ("sensor_msgs/msg/LaserScan", "sensor_msgs/msg/MultiEchoLaserScan")
+_ODOMETRY = ("nav_msgs/msg/Odometry", "foxglove_msgs/msg/Odometry")
+_LASERS = ("sensor_msgs/msg/LaserScan", "sensor_msgs/msg/MultiEchoLaserScan",
+           "foxglove_msgs/msg/LaserScan")  # fmt: skip
 #: A robot that has one of these of its own does not use one without a namespace.
-_ITS_OWN = frozenset({_ODOMETRY, *_LASERS, "sensor_msgs/msg/Imu"})
+_ITS_OWN = frozenset({*_ODOMETRY, *_LASERS, "sensor_msgs/msg/Imu"})
 #: Topics that all robots share, beside those in a namespace.
 _SHARED = frozenset({"tf", "tf_static", "rosout", "rosout_agg", "diagnostics", "diagnostics_agg"})
 
@@ -112,8 +113,8 @@ def _robots(connections: Sequence[Connection]) -> list[str]:
     """The innermost namespaces with an odometry and a laser in them."""
     types: dict[str, set[str]] = {}
     for connection in connections:
-        if connection.type == _ODOMETRY or connection.type in _LASERS:
-            kind = "odometry" if connection.type == _ODOMETRY else "laser"
+        if connection.type in (*_ODOMETRY, *_LASERS):
+            kind = "odometry" if connection.type in _ODOMETRY else "laser"
             for space in _spaces(connection.topic):
                 types.setdefault(space, set()).add(kind)
     whole = [space for space, kinds in types.items() if len(kinds) == 2]

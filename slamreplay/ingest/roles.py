@@ -77,9 +77,7 @@ def choose_odometry(topics: Sequence[TopicRows], tf: Sequence[TopicRows]) -> Cho
         on_tf = (t.frame(), t.frame("child_frame_id")) in edges
         return (on_tf, is_odom_frame(t.frame()), "odom" in tokens(t.topic), t.messages)
 
-    kinds = {_spoken(t) for t in found}
-    what = kinds.pop() if len(kinds) == 1 else "odometry"
-    return _pick(found, rank, what, "its frames are those of tf, then by name")
+    return _pick(found, rank, None, "its frames are those of tf, then by name")
 
 
 def choose_imu(topics: Sequence[TopicRows]) -> Choice | None:
@@ -89,7 +87,7 @@ def choose_imu(topics: Sequence[TopicRows]) -> Choice | None:
     def rank(t: TopicRows) -> tuple[object, ...]:
         return (bool(np.isfinite(t.columns["angular_velocity_xyz"]).any()), t.messages)
 
-    return _pick(found, rank, "sensor_msgs/Imu", "most turn rates")
+    return _pick(found, rank, None, "most turn rates")
 
 
 def choose_scan(topics: Sequence[TopicRows]) -> Choice | None:
@@ -98,7 +96,7 @@ def choose_scan(topics: Sequence[TopicRows]) -> Choice | None:
     if not found:
         return None
     if len(found) == 1:
-        return Choice(found[0], f"{_spoken(found[0])}, the only one")
+        return Choice(found[0], f"{type_name(found[0].type)}, the only one")
     beams = {id(t): valid_beams(t) for t in found}
     most = max(beams.values())
     close = [t for t in found if beams[id(t)] >= 0.9 * most]
@@ -153,7 +151,7 @@ def choose_map(topics: Sequence[TopicRows]) -> Choice | None:
              and "map" in "".join(tokens(t.topic))]  # fmt: skip
     found = found or [t for t in topics if t.table == "costmaps" and len(t) and not is_costmap(t)]
     return _pick(found, lambda t: (basename(t.topic) == "map", t.columns["width"].max()),
-                 "nav_msgs/OccupancyGrid", "called map, then the largest")  # fmt: skip
+                 None, "called map, then the largest")  # fmt: skip
 
 
 def choose_costmap(topics: Sequence[TopicRows]) -> Choice | None:
@@ -164,7 +162,7 @@ def choose_costmap(topics: Sequence[TopicRows]) -> Choice | None:
 
 
 def choose_simple(
-    topics: Sequence[TopicRows], table: str, what: str, preferred: Sequence[str]
+    topics: Sequence[TopicRows], table: str, what: str | None, preferred: Sequence[str]
 ) -> Choice | None:
     """The topic with most messages in a table; names that end in a preferred word come first."""
     found = [t for t in topics if t.table == table and len(t)]
@@ -227,10 +225,12 @@ def type_name(kind: str) -> str:
     return kind.replace("/msg/", "/")
 
 
-def _pick(found: Sequence[TopicRows], rank: Rank, what: str, order: str) -> Choice | None:
+def _pick(found: Sequence[TopicRows], rank: Rank, what: str | None, order: str) -> Choice | None:
+    """The topic that ranks highest; `what` it is, or None for its type."""
     if not found:
         return None
     chosen = max(found, key=lambda t: (rank(t), t.topic))
+    what = what or type_name(chosen.type)
     if len(found) == 1:
         return Choice(chosen, f"{what}, the only one")
     return Choice(chosen, f"{what}, chosen of {len(found)}: {order}")
@@ -249,11 +249,6 @@ def is_estimate(topic: TopicRows, frames: Frames) -> bool:
     if topic.table != "poses" or is_odom_frame(topic.frame()):
         return False
     return in_map and (bool(words & _BELIEF) or topic.type.endswith("WithCovarianceStamped"))
-
-
-def _spoken(topic: TopicRows) -> str:
-    """A type as people say it: "nav_msgs/Odometry", "carmen/ODOM"."""
-    return topic.type.replace("/msg/", "/")
 
 
 def _judges(topic: TopicRows) -> bool:
