@@ -86,16 +86,9 @@ class LogWriter:
 @pytest.fixture(scope="session")
 def type_stores():
     """rosbags' type stores of ROS 1 and ROS 2, with the types that they lack."""
-    from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+    from type_store import type_store
 
-    from slamreplay.messages.definitions import DEFINITIONS
-
-    stores = {1: get_typestore(Stores.ROS1_NOETIC), 2: get_typestore(Stores.ROS2_HUMBLE)}
-    for store in stores.values():
-        for name, text in DEFINITIONS.items():
-            if name not in store.fielddefs:
-                store.register(get_types_from_msg(text, name))
-    return stores
+    return {ros: type_store(ros) for ros in (1, 2)}
 
 
 @pytest.fixture

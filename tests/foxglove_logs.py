@@ -4,13 +4,14 @@ import base64
 import importlib
 import json
 import math
+from itertools import accumulate, pairwise
 
 import numpy as np
 from mcap.writer import Writer
 from mcap_protobuf.schema import build_file_descriptor_set
 from rosbags.interfaces import Nodetype
 
-from slamreplay.ingest.readers.reader import Connection
+from slamreplay.ingest.readers.reader import Block, Connection
 from slamreplay.ingest.reading import read_rows
 
 TYPES = ("PoseInFrame", "PosesInFrame", "FrameTransform", "FrameTransforms", "LaserScan", "Grid",
@@ -101,9 +102,11 @@ class Payloads:
         self.connections = (Connection(0, topic, kind, encoding, "", "", len(payloads), schema),)
         self.sources, self.losses, self._payloads = (), [], payloads
 
-    def messages(self, wanted):
+    def blocks(self, wanted):
         if 0 in wanted:
-            yield from ((0, k, payload) for k, payload in enumerate(self._payloads))
+            ends = [0, *accumulate(len(payload) for payload in self._payloads)]
+            found = [(0, a, b, k) for k, (a, b) in enumerate(pairwise(ends))]
+            yield Block.of(b"".join(self._payloads), found)
 
 
 def read(kind, encoding, payloads, schema=b"", topic="/topic"):
@@ -111,7 +114,7 @@ def read(kind, encoding, payloads, schema=b"", topic="/topic"):
     reader = Payloads(kind, encoding, payloads, schema, topic)
     rows, losses = read_rows([reader], lambda _topic: None, None)
     return rows, {
-        (loss.kind, loss.reason.partition(" (log time")[0]): loss.count for loss in losses
+        (loss.kind, loss.reason.partition(" (first at log time")[0]): loss.count for loss in losses
     }
 
 

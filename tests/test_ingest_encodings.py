@@ -20,13 +20,13 @@ from google.protobuf.message import DecodeError
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from rosbags.interfaces import Nodetype
+from type_store import type_store
 
 from slamreplay.errors import LogError
 from slamreplay.ingest.encodings import deserialiser
 from slamreplay.ingest.readers.reader import Connection, normalise_type
-from slamreplay.ingest.types import shipped
 
-STORE = shipped("cdr")
+STORE = type_store()
 ROS_TYPES = (
     "sensor_msgs/msg/LaserScan", "nav_msgs/msg/Odometry", "sensor_msgs/msg/Imu",
     "geometry_msgs/msg/PoseWithCovarianceStamped", "tf2_msgs/msg/TFMessage",

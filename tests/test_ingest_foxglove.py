@@ -5,13 +5,13 @@ import pytest
 from foxglove_logs import PREFIX, descriptors, read, to_json, to_protobuf, to_ros
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from type_store import type_store
 
 from slamreplay.geometry import se3
 from slamreplay.geometry.times import NO_STAMP
 from slamreplay.ingest.decoders.grid import COST_SCALE
-from slamreplay.ingest.types import shipped
 
-STORE = shipped("cdr")
+STORE = type_store()
 STAMP = {"sec": 5, "nanosec": 6}
 T = 5_000_000_006
 ORIGIN = {"x": 0.0, "y": 0.0, "z": 0.0}

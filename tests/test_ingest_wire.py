@@ -1,18 +1,16 @@
 """Columns read from bytes are what rosbags reads message by message, for every type we decode."""
 
-from functools import cache
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from rosbags.interfaces import Nodetype
-from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+from rosbags.typesys import get_types_from_msg
+from type_store import type_store
 
 from slamreplay.ingest import DECODERS
 from slamreplay.ingest.wire.layout import Number, Struct, Text, layout_of
 from slamreplay.ingest.wire.read import read_messages
-from slamreplay.messages.definitions import DEFINITIONS, LATER_DEFINITIONS
 
 #: Layouts that alignment makes awkward: what real types have only here and there, all at once.
 ODD = {
@@ -29,11 +27,9 @@ ODD = {
 NAMES = sorted(n for n in {*DECODERS, "odd/msg/All"} if not n.startswith("foxglove"))
 
 
-@cache
 def store(ros, *, later=False):
-    found = get_typestore(Stores.ROS1_NOETIC if ros == 1 else Stores.ROS2_HUMBLE)
-    shipped = DEFINITIONS | (LATER_DEFINITIONS if later else {}) | ODD
-    for name, text in shipped.items():
+    found = type_store(ros, later=later)
+    for name, text in ODD.items():
         if name not in found.fielddefs:
             found.register(get_types_from_msg(text, name))
     return found

@@ -36,7 +36,8 @@ class TopicReader:
         self._layouts = layouts(connection) if is_wire else []
         self._deserialise = None if is_wire else deserialiser(connection)
         self._decoder: Decoder = DECODERS.load(connection.type)
-        self._broken: dict[str, tuple[int, int]] = {}
+        self._broken = 0
+        self._first_broken = ""
         self._remarks: dict[tuple[Any, str], int] = {}
 
     def decode(self, block: Block, index: NDArray[np.int64]) -> list[TopicRows]:
@@ -55,9 +56,9 @@ class TopicReader:
         """What went wrong, once all is decoded."""
         what = self.connection.topic
         found = []
-        for reason, (count, t_log_ns) in self._broken.items():
-            said = f"cannot be decoded: {reason} (first at log time {t_log_ns} ns)"
-            found.append(Loss(kind="lost", what=what, count=count, reason=said))
+        if self._broken:
+            reason = f"cannot be decoded: {self._first_broken}"
+            found.append(Loss(kind="lost", what=what, count=self._broken, reason=reason))
         for path, count in self._deserialise.missing.items() if self._deserialise else ():
             reason = f"no '{path}' in it: taken as zero or empty"
             found.append(Loss(kind="repaired", what=what, count=count, reason=reason))
@@ -115,5 +116,6 @@ class TopicReader:
         return rows
 
     def _lose(self, reason: str, t_log_ns: Times) -> None:
-        count, first = self._broken.get(reason, (0, int(t_log_ns[0])))
-        self._broken[reason] = (count + len(t_log_ns), first)
+        if not self._broken:
+            self._first_broken = f"{reason} (first at log time {t_log_ns[0]} ns)"
+        self._broken += len(t_log_ns)
