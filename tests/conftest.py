@@ -75,6 +75,7 @@ class LogWriter:
             if form == Nodetype.BASE:
                 return "" if args[0] == "string" else args[0] == "never" if args[0] == "bool" else 0
             inner, size = args
+            size = size if form == Nodetype.ARRAY else 0  # of a sequence it is the bound
             if inner[0] == Nodetype.BASE and inner[1][0] != "string":
                 return np.zeros(size or 0, dtype=np.dtype(inner[1][0].replace("byte", "uint8")))
             return [value(inner) for _ in range(size or 0)]
@@ -88,14 +89,28 @@ def type_stores():
     """rosbags' type stores of ROS 1 and ROS 2, with the types that they lack."""
     from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
+    from slamreplay.ingest import DECODERS
     from slamreplay.messages.definitions import DEFINITIONS
+    from slamreplay.messages.layouts import likeliest_layout
 
     stores = {1: get_typestore(Stores.ROS1_NOETIC), 2: get_typestore(Stores.ROS2_HUMBLE)}
     for store in stores.values():
         for name, text in DEFINITIONS.items():
             if name not in store.fielddefs:
                 store.register(get_types_from_msg(text, name))
+    for name in DECODERS:
+        register_layout(stores[2], name, likeliest_layout(name))
     return stores
+
+
+def register_layout(store, name, text):
+    """Add a type in one of its layouts, with the types it needs, to a type store of ROS 2."""
+    from rosbags.typesys import get_types_from_msg
+
+    if text:
+        root, *others = get_types_from_msg(text, name).items()
+        wanted = {name: root[1], **dict(others)}  # rosbags knows no names of the form pkg/srv/X
+        store.register({k: v for k, v in wanted.items() if k not in store.fielddefs})
 
 
 @pytest.fixture

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any
 from slamreplay.errors import LogError
 from slamreplay.ingest.readers.reader import Connection
 from slamreplay.messages.definitions import DEFINITIONS
+from slamreplay.messages.interfaces import message_definition
+from slamreplay.messages.layouts import likeliest_layout
 
 if TYPE_CHECKING:
     from rosbags.interfaces.typing import Typesdict
@@ -38,6 +40,7 @@ def deserialiser(connection: Connection) -> Callable[[bytes], Any]:
 def _store(encoding: str, name: str, form: str, text: str) -> Typestore:
     from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore
 
+    text = message_definition(name, text) if text else likeliest_layout(name)
     if not text:
         store = _shipped(encoding)
         if name not in store.fielddefs:
@@ -47,6 +50,8 @@ def _store(encoding: str, name: str, form: str, text: str) -> Typestore:
     shipped = _shipped(encoding).fielddefs
     try:
         found = get_types_from_idl(text) if form == "idl" else get_types_from_msg(text, name)
+        if "/srv/" in name:  # rosbags knows no names of this form
+            found = {name: found.pop(next(iter(found))), **found}
         while missing := sorted(_needed(found) & set(shipped) - set(found)):
             # Recorders leave out builtin_interfaces, and odd bags even std_msgs/Header.
             found |= {t: shipped[t] for t in missing}
