@@ -91,7 +91,22 @@ def row_times(topic: TopicRows, clock: Clock) -> tuple[Times, list[Loss]]:
 
 
 #: What has no header: a log time is all it ever had.
-_UNSTAMPED = frozenset({"geometry_msgs/msg/Twist", "map_server"})
+_UNSTAMPED = frozenset(
+    {
+        "geometry_msgs/msg/Twist",
+        "map_server",
+        "action_msgs/msg/GoalStatusArray",
+        "nav2_msgs/msg/CollisionMonitorState",
+        "nav2_msgs/msg/CollisionDetectorState",
+        "nav2_msgs/action/Spin_FeedbackMessage",
+        "nav2_msgs/action/BackUp_FeedbackMessage",
+        "nav2_msgs/action/Wait_FeedbackMessage",
+        "nav2_msgs/action/DriveOnHeading_FeedbackMessage",
+        "nav2_msgs/action/AssistedTeleop_FeedbackMessage",
+        "nav2_msgs/action/DockRobot_FeedbackMessage",
+        "opennav_docking_msgs/action/DockRobot_FeedbackMessage",
+    }
+)
 
 
 def _static(topic: TopicRows) -> bool:
