@@ -10,8 +10,10 @@ from slamreplay.bundle.view import ROLE_TABLES
 from slamreplay.errors import UsageError
 from slamreplay.ingest import roles
 from slamreplay.ingest.frames import direct_pose, find_frames, settle, without_frame
+from slamreplay.ingest.goals import settle_goals
 from slamreplay.ingest.lasers import second_scan
 from slamreplay.ingest.leaks import repeated_reference
+from slamreplay.ingest.log_lines import told_in_logs
 from slamreplay.ingest.names import is_map_frame, is_reference, tokens
 from slamreplay.ingest.roles import Choice
 from slamreplay.ingest.rows import TopicRows
@@ -46,7 +48,9 @@ def settle_cast(topics: Sequence[TopicRows], overrides: Mapping[str, str]) -> Ca
         UsageError: a topic's type cannot play the role it was given.
     """
     tf_rows, tree, losses = settle([t for t in topics if t.table == "transforms"])
-    others = [t for t in topics if t.table != "transforms"]
+    others, ended = settle_goals([t for t in topics if t.table != "transforms"])
+    others += told_in_logs(others)
+    losses = [*losses, *ended]
     free = _not_given(others, overrides)
     given = {r: _given(r, n, [*others, *tf_rows]) for r, n in overrides.items() if r in ROLE_TABLES}
     found: dict[str, Choice | None] = {
@@ -77,9 +81,11 @@ def settle_cast(topics: Sequence[TopicRows], overrides: Mapping[str, str]) -> Ca
             frames, tf_rows, loss = without_frame(frame, topic, frames, tf_rows)
             losses.append(loss)
     initial = [t for t in free("initial_pose") if roles.is_initial_pose(t)]
+    called = [t for t in free("initial_pose") if t.table == "initial_poses"]
     found |= {
         "pose": roles.choose_pose([*free("pose"), *tf_rows], frames),
-        "initial_pose": roles.choose_simple(initial, "poses", "named as one", ("initialpose",)),
+        "initial_pose": roles.choose_simple(initial, "poses", "named as one", ("initialpose",))
+        or roles.choose_simple(called, "initial_poses", "given by a service", ()),
         "points": roles.choose_simple(free("points"), "points", "point cloud", ("points",)),
         "plan": roles.choose_simple(free("plan"), "plans", "nav_msgs/Path", ("plan", "path")),
         "command": roles.choose_command(free("command")),
@@ -113,7 +119,7 @@ def _given(role: str, name: str, topics: Sequence[TopicRows]) -> Choice:
     table = ROLE_TABLES[role]
     fitting = {
         "references": ("poses", "odometry", "references"),
-        "initial_poses": ("poses",),
+        "initial_poses": ("poses", "initial_poses"),
         "poses": ("poses", "odometry", "transforms"),
         "map_updates": ("costmaps",),
     }.get(table, (table,))

@@ -15,6 +15,7 @@ from slamreplay.ingest.cast import settle_cast
 from slamreplay.ingest.clock import choose_clock, row_times
 from slamreplay.ingest.lasers import no_returns
 from slamreplay.ingest.layers import lay_out
+from slamreplay.ingest.log_lines import is_told_in_log
 from slamreplay.ingest.options import IngestOptions
 from slamreplay.ingest.overrides import check_topics, read_overrides
 from slamreplay.ingest.parts import missing_parts
@@ -70,7 +71,7 @@ def ingest(
     for topic in layers.topics:
         t_ns, remarks = row_times(topic, clock)
         timed.append((topic, t_ns))
-        losses += remarks
+        losses += [] if is_told_in_log(topic) else remarks  # its lines are told of already
     if options.reference is not None:
         rows, source, remarks = _survey(options.reference, cast.frames)
         timed.append((rows, rows.t_sensor_ns))
