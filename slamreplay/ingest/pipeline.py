@@ -13,6 +13,7 @@ from slamreplay.bundle.tables import Table
 from slamreplay.bundle.view import Bundle
 from slamreplay.ingest.cast import settle_cast
 from slamreplay.ingest.clock import choose_clock, row_times
+from slamreplay.ingest.inferred import with_inferred
 from slamreplay.ingest.lasers import no_returns
 from slamreplay.ingest.layers import lay_out
 from slamreplay.ingest.log_lines import is_told_in_log
@@ -98,6 +99,7 @@ def ingest(
         losses=_sorted(losses),
         tables={},
     )
+    tables = with_inferred(Bundle(manifest, tables, {}).view(), tables)
     write_bundle(target, manifest, tables, layers.grids)
     return Bundle.open(target)
 
