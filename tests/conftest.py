@@ -91,7 +91,7 @@ def type_stores():
 
     from slamreplay.ingest import DECODERS
     from slamreplay.messages.definitions import DEFINITIONS
-    from slamreplay.messages.layouts import likeliest_layout
+    from slamreplay.messages.layouts import layouts
 
     stores = {1: get_typestore(Stores.ROS1_NOETIC), 2: get_typestore(Stores.ROS2_HUMBLE)}
     for store in stores.values():
@@ -99,7 +99,8 @@ def type_stores():
             if name not in store.fielddefs:
                 store.register(get_types_from_msg(text, name))
     for name in DECODERS:
-        register_layout(stores[2], name, likeliest_layout(name))
+        if "/msg/" not in name:
+            register_layout(stores[2], name, layouts(name)[-1])
     return stores
 
 
@@ -107,10 +108,9 @@ def register_layout(store, name, text):
     """Add a type in one of its layouts, with the types it needs, to a type store of ROS 2."""
     from rosbags.typesys import get_types_from_msg
 
-    if text:
-        root, *others = get_types_from_msg(text, name).items()
-        wanted = {name: root[1], **dict(others)}  # rosbags knows no names of the form pkg/srv/X
-        store.register({k: v for k, v in wanted.items() if k not in store.fielddefs})
+    root, *others = get_types_from_msg(text, name).items()
+    wanted = {name: root[1], **dict(others)}  # rosbags knows no names of the form pkg/srv/X
+    store.register({k: v for k, v in wanted.items() if k not in store.fielddefs})
 
 
 @pytest.fixture

@@ -266,7 +266,7 @@ def stumble(decoded, messages):
 
 
 def scribble(decoded, messages):
-    for message in messages:
+    for message in messages._items:
         message.linear.x = 7.0
     return decoded
 

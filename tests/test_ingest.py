@@ -135,6 +135,23 @@ def test_same_log_gives_same_bytes(logs, robot, tmp_path):
     assert [p.read_bytes() for p in files[0]] == [p.read_bytes() for p in files[1]]
 
 
+def test_columns_that_wait_on_disk_give_the_same_bytes(logs, robot, tmp_path, monkeypatch):
+    messages = [m for k in range(40) for m in robot.messages()[k::40]]  # not in the order of time
+    paths = [logs.write("a.mcap", messages[::2]), logs.write("b.mcap", messages[1::2])]
+    one = ingest(paths, tmp_path / "one" / "b")
+    monkeypatch.setattr("slamreplay.ingest.rows.MEMORY_BYTES", 2000)
+    monkeypatch.setattr("slamreplay.ingest.readers.windows.WINDOW_BYTES", 3000)
+    files = []
+    real = np.memmap
+    monkeypatch.setattr(np, "memmap", lambda path, **kw: files.append(path) or real(path, **kw))
+
+    two = ingest(paths, tmp_path / "two" / "b")
+
+    assert files
+    assert two.manifest == one.manifest
+    assert [p.name for p in (tmp_path / "two").iterdir()] == ["b"]
+
+
 def test_split_logs_in_any_order_are_one_log(logs, robot, tmp_path):
     messages = robot.messages()
     first, second = logs.write("1.mcap", messages[:60]), logs.write("2.mcap", messages[60:])
@@ -609,7 +626,8 @@ def test_a_cut_log_is_read_up_to_the_cut_or_refused_in_one_line(logs, tmp_path, 
     bundle = ingest([path], tmp_path / "b")
     assert 0 < len(bundle.table("scans")) < 400
     (lost,) = [entry for entry in bundle.manifest.losses if entry.kind == "lost"]
-    assert "broken" in lost.reason
+    assert "cut within a chunk" in lost.reason
+    assert lost.last_good_ns == bundle.table("scans")["t_log_ns"].max()
 
 
 @pytest.mark.parametrize("name", ["log.mcap", "one.bag", "log.db3"])

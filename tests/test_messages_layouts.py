@@ -1,5 +1,6 @@
 """Layouts of one name: the first that reads a message to its end is the one it was written in."""
 
+import numpy as np
 import pytest
 from conftest import register_layout
 from hypothesis import given
@@ -8,10 +9,12 @@ from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from slamreplay.ingest.readers.open_log import open_log
-from slamreplay.ingest.types import deserialiser
+from slamreplay.ingest.readers.reader import Connection
+from slamreplay.ingest.types import layouts as layouts_of
+from slamreplay.ingest.wire.read import read_messages
 from slamreplay.messages.definitions import DEFINITIONS, LATER_DEFINITIONS
 from slamreplay.messages.interfaces import SEPARATOR, message_definition
-from slamreplay.messages.layouts import layouts, likeliest_layout
+from slamreplay.messages.layouts import layouts
 from slamreplay.messages.recoveries import INTERFACES
 
 TREE = "nav2_msgs/msg/BehaviorTreeLog"
@@ -107,12 +110,6 @@ def test_layouts_come_newest_first_and_whole():
     assert layouts("nobody_msgs/msg/Unknown") == []
 
 
-def test_logs_without_definitions_are_of_humble_or_older():
-    assert likeliest_layout(TO_POSE) == layouts(TO_POSE)[1]
-    assert "plugins" not in likeliest_layout(CLEAR)
-    assert likeliest_layout(TREE) == ""  # DEFINITIONS has it
-
-
 @pytest.mark.parametrize("name", INTERFACES)
 def test_every_layout_of_an_action_or_service_is_whole(name):
     parts = ["Event"] if "/srv/" in name else ["FeedbackMessage", "SendGoal_Event"]
@@ -163,14 +160,40 @@ def test_definitions_of_plain_messages_stay_as_they_are(name, text):
     assert message_definition(name, text) == text
 
 
+def test_the_text_of_an_action_is_no_definition_of_its_status():
+    text = f"{SEPARATOR}ACTION: nav2_msgs/action/Spin\nfloat32 target_yaw\n---\n---\n"
+
+    assert message_definition("action_msgs/msg/GoalStatusArray", text) == ""
+
+
 def test_service_events_of_a_real_recorder_are_read(real_logs):
     folder = real_logs / "fixtures/rosbag2_resources/rosbag2_tests/resources/mcap"
     path = folder / "bag_with_topics_and_service_events/bag_with_topics_and_service_events.mcap"
+    kinds, asked = [], 0
     with open_log([path]) as ((reader,), _):
-        events = {c.index: deserialiser(c) for c in reader.connections if c.type.endswith("_Event")}
-        read = [events[index](data) for index, _, data in reader.messages(set(events))]
+        events = {c.index: c for c in reader.connections if c.type.endswith("_Event")}
+        for block in reader.blocks(set(events)):
+            for index, connection in events.items():
+                own = block.connection == index
+                for messages, _ in read_messages(
+                    block.data, block.start[own], block.end[own], block.t_log_ns[own],
+                    connection.topic, layouts_of(connection), connection.encoding,
+                ):  # fmt: skip
+                    kinds += messages.column("info.event_type", np.int64).tolist()
+                    asked += len(messages.children("request")[1])
 
-    assert len(read) == 8
-    assert sorted({m.info.event_type for m in read}) == [0, 3]
-    assert {len(m.request) for m in read if m.info.event_type == 0} == {1}
-    assert {len(m.response) for m in read if m.info.event_type == 3} == {1}
+    assert sorted(kinds) == [0, 0, 0, 0, 3, 3, 3, 3]
+    assert asked == 4
+
+
+def test_a_type_without_fields_is_a_byte_of_cdr_and_none_of_ros1():
+    text = f"a_msgs/Nothing nothing\nuint8 last\n{SEPARATOR}MSG: a_msgs/Nothing\n"
+
+    for encoding, payload in (("ros1", b"\x07"), ("cdr", b"\x00\x01\x00\x00\x00\x07")):
+        connection = Connection(0, "/t", "a_msgs/msg/A", encoding, text, "msg", 1)
+        data = np.frombuffer(payload, dtype=np.uint8)
+        start, end = np.array([0]), np.array([len(payload)])
+        ((messages, _),) = read_messages(
+            data, start, end, start, "/t", layouts_of(connection), encoding
+        )
+        assert messages.column("last").tolist() == [7]

@@ -16,6 +16,8 @@ from slamreplay.errors import OutputError
 def atomic_folder(target: Path, *, marker: str) -> Iterator[Path]:
     """A temporary folder that becomes `target` when the block ends, and vanishes if it fails.
 
+    A block that removes the folder leaves the target as it is.
+
     Args:
         target: the folder to be; one of ours is replaced in one step.
         marker: the file by which a folder of ours is known; an existing folder without it, unless
@@ -37,6 +39,8 @@ def atomic_folder(target: Path, *, marker: str) -> Iterator[Path]:
     try:
         work.chmod(0o755)
         yield work
+        if not work.exists():  # the block gave it up: what is at the target stays
+            return
         old = work.with_name(work.name + ".old")
         if target.exists():
             target.rename(old)

@@ -106,13 +106,18 @@ class TableEntry(_Strict):
 class Loss(_Strict):
     """Something in the log that is not in the tables, or was mended on the way: what and how much.
 
-    `kind`: skipped (no use for it), lost (could not be read), repaired (mended and kept).
+    `kind`: skipped (no use for it), lost (could not be read), repaired (mended and kept). Of a
+    damaged file also the bytes and messages that went with it, where somebody knows, and the log
+    time of the last good message before.
     """
 
     kind: Literal["skipped", "lost", "repaired"]
     what: str
     count: int
     reason: str
+    bytes: int | None = None
+    messages: int | None = None
+    last_good_ns: int | None = None
 
 
 class Manifest(_Strict):

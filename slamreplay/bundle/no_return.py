@@ -25,9 +25,14 @@ def told_as_range_max(
         ranges_m: (...) of one laser, all its scans.
         range_max_m: (...) of each range, or what broadcasts to it.
     """
+    found = np.zeros(ranges_m.shape, dtype=bool)
+    limit = (range_max_m - (_NEAR_M + _CODE_M)).astype(ranges_m.dtype)
     with np.errstate(invalid="ignore"):
-        at = np.abs(ranges_m - range_max_m) <= _CODE_M
-        before = (ranges_m < range_max_m - _CODE_M) & (ranges_m >= range_max_m - _NEAR_M)
-    expected = np.count_nonzero(before) * _CODE_M / _NEAR_M
-    is_code = np.count_nonzero(at) >= max(_LEAST, _TIMES * expected)
-    return at if is_code else np.zeros_like(at)
+        near = np.flatnonzero(ranges_m >= limit)  # few, so that the rest is cheap
+        far = np.broadcast_to(range_max_m, ranges_m.shape)
+        short = far[np.unravel_index(near, far.shape)] - ranges_m.ravel()[near]
+        at = np.abs(short) <= _CODE_M
+        before = np.count_nonzero((short > _CODE_M) & (short <= _NEAR_M))
+    if np.count_nonzero(at) >= max(_LEAST, _TIMES * before * _CODE_M / _NEAR_M):
+        found.ravel()[near[at]] = True
+    return found

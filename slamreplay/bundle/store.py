@@ -5,8 +5,10 @@ from __future__ import annotations
 import hashlib
 import io
 import json
-from collections.abc import Mapping
+import shutil
+from collections.abc import Iterator, Mapping
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 import pyarrow as pa
@@ -16,28 +18,45 @@ from pydantic import ValidationError
 
 from slamreplay.bundle.atomic import atomic_folder
 from slamreplay.bundle.manifest import Manifest, MapVersion, TableEntry
-from slamreplay.bundle.schema import FORMAT_VERSION, TABLES
+from slamreplay.bundle.schema import FORMAT_VERSION, TABLES, TableSchema
 from slamreplay.bundle.tables import Table
 from slamreplay.errors import BundleError
+from slamreplay.geometry.times import Times
 from slamreplay.maps.grid import OccupancyGrid
 from slamreplay.maps.map_server import map_files
 
 MANIFEST = "manifest.json"
 
 
-def parquet_bytes(table: Table) -> bytes:
-    """The table as a Parquet file; the same rows give the same bytes."""
-    sink = io.BytesIO()
+class Rows(Protocol):
+    """A table, or one too large for memory that gives its rows part by part."""
+
+    @property
+    def t_ns(self) -> Times:
+        """(N,) times on the bundle's clock."""
+        ...
+
+    def __len__(self) -> int: ...
+
+    def groups(self) -> Iterator[Table]:
+        """All rows in order, in parts that fit in memory."""
+        ...
+
+
+def write_parquet(rows: Rows, schema: TableSchema, path: Path) -> None:
+    """A table as a Parquet file, a row group at a time; the same rows give the same bytes."""
     # Dictionary coding pays for text only, and costs more than compression on measured numbers.
-    text = [c.name for c in table.schema.columns if c.kind == "str"]
-    pq.write_table(table.to_arrow(), sink, compression="zstd", use_dictionary=text)
-    return sink.getvalue()
+    text = [c.name for c in schema.columns if c.kind == "str"]
+    arrow = schema.arrow_schema
+    with pq.ParquetWriter(path, arrow, compression="zstd", use_dictionary=text) as writer:
+        for group in rows.groups():
+            writer.write_table(group.to_arrow())
 
 
 def write_bundle(
     target: Path,
     manifest: Manifest,
-    tables: Mapping[str, Table],
+    tables: Mapping[str, Rows],
     grids: Mapping[str, OccupancyGrid],
 ) -> Manifest:
     """Write a bundle and return its manifest with table entries, maps and id filled in.
@@ -51,43 +70,43 @@ def write_bundle(
     Raises:
         OutputError: the folder is somebody else's or cannot be written.
     """
-    whole = {name: tables.get(name, Table.empty(schema)) for name, schema in TABLES.items()}
-    files = {f"tables/{name}.parquet": parquet_bytes(table) for name, table in whole.items()}
-    entries = {
-        name: TableEntry(
-            rows=len(table),
-            start_ns=int(table.t_ns.min()) if len(table) else None,
-            end_ns=int(table.t_ns.max()) if len(table) else None,
-            sha256=_sha256(files[f"tables/{name}.parquet"]),
-        )
-        for name, table in whole.items()
-    }
-    maps = []
-    for source, grid in grids.items():
-        folder = grid.version.removeprefix("sha256:")[:16]
-        files |= {f"maps/{folder}/{k}": v for k, v in _map_folder(grid).items()}
-        height, width = grid.cells.shape
-        maps.append(
-            MapVersion(
-                version=grid.version,
-                folder=folder,
-                source=source,
-                width=width,
-                height=height,
-                resolution_m=grid.resolution_m,
-            )
-        )
-    manifest = manifest.model_copy(update={"tables": entries, "maps": maps, "bundle_id": ""})
-    identity = _sha256(manifest.model_dump_json().encode())
-    manifest = manifest.model_copy(update={"bundle_id": identity[:16]})
-    if _already_there(target, manifest):
-        return manifest
     with atomic_folder(target, marker=MANIFEST) as work:
-        for name, content in files.items():
-            (work / name).parent.mkdir(parents=True, exist_ok=True)
-            (work / name).write_bytes(content)
+        entries = {}
+        (work / "tables").mkdir()
+        for name, schema in TABLES.items():
+            rows = tables.get(name, Table.empty(schema))
+            file = work / "tables" / f"{name}.parquet"
+            write_parquet(rows, schema, file)
+            entries[name] = TableEntry(
+                rows=len(rows),
+                start_ns=int(rows.t_ns.min()) if len(rows) else None,
+                end_ns=int(rows.t_ns.max()) if len(rows) else None,
+                sha256=_sha256(file),
+            )
+        maps = []
+        for source, grid in grids.items():
+            folder = grid.version.removeprefix("sha256:")[:16]
+            (work / "maps" / folder).mkdir(parents=True, exist_ok=True)
+            for name, content in _map_folder(grid).items():
+                (work / "maps" / folder / name).write_bytes(content)
+            height, width = grid.cells.shape
+            maps.append(
+                MapVersion(
+                    version=grid.version,
+                    folder=folder,
+                    source=source,
+                    width=width,
+                    height=height,
+                    resolution_m=grid.resolution_m,
+                )
+            )
+        manifest = manifest.model_copy(update={"tables": entries, "maps": maps, "bundle_id": ""})
+        identity = hashlib.sha256(manifest.model_dump_json().encode()).hexdigest()
+        manifest = manifest.model_copy(update={"bundle_id": identity[:16]})
         text = json.dumps(manifest.model_dump(mode="json"), indent=1, allow_nan=False)
         (work / MANIFEST).write_text(text + "\n", encoding="utf-8")
+        if _already_there(target, manifest):
+            shutil.rmtree(work)
     return manifest
 
 
@@ -128,16 +147,9 @@ def read_table(path: Path, manifest: Manifest, name: str) -> Table:
         BundleError: missing, changed since it was written, or unreadable.
     """
     file = path / "tables" / f"{name}.parquet"
+    _check(file, manifest, name)
     try:
-        content = file.read_bytes()
-    except OSError as error:
-        raise BundleError("table is missing", where=file, hint="ingest the log again") from error
-    if name not in manifest.tables or _sha256(content) != manifest.tables[name].sha256:
-        raise BundleError(
-            "bytes do not match the manifest's hash", where=file, hint="ingest the log again"
-        )
-    try:
-        return Table.from_arrow(TABLES[name], pq.read_table(pa.BufferReader(content)))
+        return Table.from_arrow(TABLES[name], pq.read_table(file, memory_map=False))
     except pa.ArrowException as error:
         raise BundleError(f"not a readable Parquet file: {error}", where=file) from error
 
@@ -183,7 +195,7 @@ def _already_there(target: Path, manifest: Manifest) -> bool:
         if read_manifest(target) != manifest:
             return False
         for name in manifest.tables:
-            read_table(target, manifest, name)
+            _check(target / "tables" / f"{name}.parquet", manifest, name)
         for entry in manifest.maps:
             read_grid(target, entry)
     except BundleError:
@@ -191,5 +203,17 @@ def _already_there(target: Path, manifest: Manifest) -> bool:
     return True
 
 
-def _sha256(content: bytes) -> str:
-    return hashlib.sha256(content).hexdigest()
+def _check(file: Path, manifest: Manifest, name: str) -> None:
+    try:
+        digest = _sha256(file)
+    except OSError as error:
+        raise BundleError("table is missing", where=file, hint="ingest the log again") from error
+    if name not in manifest.tables or digest != manifest.tables[name].sha256:
+        raise BundleError(
+            "bytes do not match the manifest's hash", where=file, hint="ingest the log again"
+        )
+
+
+def _sha256(file: Path) -> str:
+    with file.open("rb") as stream:
+        return hashlib.file_digest(stream, "sha256").hexdigest()

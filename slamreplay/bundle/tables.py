@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -10,12 +10,22 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
+from slamreplay.bundle.arrow import (
+    nulls_from_arrow,
+    numbers_from_arrow,
+    numbers_to_arrow,
+    texts_from_arrow,
+    texts_to_arrow,
+)
 from slamreplay.bundle.schema import Column, TableSchema
 from slamreplay.errors import BundleError
 from slamreplay.geometry.times import NO_STAMP
 
 if TYPE_CHECKING:
     import pandas as pd
+
+#: Bytes of a row group: what is held at once while a large table is written or read.
+GROUP_BYTES = 128_000_000
 
 _DTYPES: dict[str, Any] = {
     "int64": np.int64,
@@ -48,9 +58,25 @@ class Ragged:
         return self.values[self.offsets[row] : self.offsets[row + 1]]
 
     @property
+    def nbytes(self) -> int:
+        """Bytes in memory."""
+        return int(self.values.nbytes + self.offsets.nbytes)
+
+    @property
     def lengths(self) -> NDArray[np.int64]:
         """(N,) entries in each row."""
         return np.diff(self.offsets)
+
+    def rows(self, first: int, last: int) -> Ragged:
+        """The rows from `first` up to `last`, without a copy."""
+        begin, end = self.offsets[first], self.offsets[last]
+        return Ragged(self.values[begin:end], self.offsets[first : last + 1] - begin)
+
+    def spread(self, numbers: NDArray[Any]) -> NDArray[Any]:
+        """One number a row (N,) as one an entry; a single one where all rows have the same."""
+        if len(numbers) and bool((numbers == numbers[0]).all()):
+            return numbers[:1]
+        return np.repeat(numbers, self.lengths)
 
     def take(self, index: NDArray[np.int64]) -> Ragged:
         """The rows at `index`, in that order."""
@@ -61,6 +87,24 @@ class Ragged:
 
 
 ColumnData = NDArray[Any] | Ragged
+
+
+def group_bounds(rows: int, size: int) -> Iterator[range]:
+    """Ranges of rows of about `GROUP_BYTES`, of `size` bytes in all; one range at least."""
+    step = max(rows * GROUP_BYTES // max(size, 1), 1)
+    for start in range(0, max(rows, 1), step):
+        yield range(start, min(start + step, rows))
+
+
+def concatenated(columns: Sequence[Any]) -> Any:
+    """Columns of one kind, one after the other; a single one as it is."""
+    if len(columns) == 1:
+        return columns[0]
+    if not isinstance(columns[0], Ragged):
+        return np.concatenate(columns)
+    offsets = np.concatenate([[0], np.cumsum(np.concatenate([c.lengths for c in columns]))])
+    values = [c.values[c.offsets[0] : c.offsets[-1]] for c in columns]
+    return Ragged(np.concatenate(values), offsets.astype(np.int64))
 
 
 class Table:
@@ -122,7 +166,16 @@ class Table:
 
     def sorted_by_time(self) -> Table:
         """Rows ordered by `t_ns`, then by log time; equal rows keep their order."""
+        steps, log_steps = np.diff(self.t_ns), np.diff(self["t_log_ns"])
+        if bool(((steps > 0) | ((steps == 0) & (log_steps >= 0))).all()):
+            return self
         return self.take(np.lexsort((self["t_log_ns"], self.t_ns)))
+
+    def groups(self) -> Iterator[Table]:
+        """The rows in parts of `GROUP_BYTES`, which are the row groups of the Parquet file."""
+        size = sum(data.nbytes for data in self._columns.values())
+        for rows in group_bounds(len(self), size):
+            yield self if len(rows) == len(self) else self.take(np.arange(rows.start, rows.stop))
 
     def to_arrow(self) -> pa.Table:
         """The Parquet form."""
@@ -148,10 +201,11 @@ class Table:
     def concat(cls, schema: TableSchema, tables: Iterable[Table]) -> Table:
         """All rows, one table after the other."""
         parts = list(tables)
-        if not parts:
-            return cls.empty(schema)
-        whole = pa.concat_tables([t.to_arrow() for t in parts])
-        return cls.from_arrow(schema, whole)
+        if len(parts) < 2:
+            return parts[0] if parts else cls.empty(schema)
+        return cls(
+            schema, {c.name: concatenated([t[c.name] for t in parts]) for c in schema.columns}
+        )
 
 
 def _checked(column: Column, data: Any, table: str) -> ColumnData:
@@ -161,9 +215,9 @@ def _checked(column: Column, data: Any, table: str) -> ColumnData:
             return Ragged.of(data, dtype)
         return Ragged(np.asarray(data.values, dtype=dtype), np.asarray(data.offsets, np.int64))
     if column.kind == "str":
-        array = np.array(data, dtype=object)
+        array = np.asarray(data, dtype=object)
     else:
-        array = np.array(data, dtype=_DTYPES[column.kind])
+        array = np.asarray(data, dtype=_DTYPES[column.kind])
     if not len(array):
         array = array.reshape((0, column.size) if column.size else (0,))
     expected = (len(array), column.size) if column.size else (len(array),)
@@ -171,33 +225,40 @@ def _checked(column: Column, data: Any, table: str) -> ColumnData:
         raise BundleError(
             f"column '{column.name}' has shape {array.shape}, expected {expected}", where=table
         )
-    array.setflags(write=False)
-    return array
+    own = array.view()  # the caller's array stays as writable as it was
+    own.setflags(write=False)
+    return own
 
 
 def _to_arrow(column: Column, data: ColumnData) -> pa.Array:
+    kind = column.arrow_type
     if isinstance(data, Ragged):
-        values = pa.array(data.values, type=column.arrow_type.value_type)
-        return pa.ListArray.from_arrays(pa.array(data.offsets, type=pa.int32()), values)
+        values = numbers_to_arrow(data.values, kind.value_type)
+        offsets = numbers_to_arrow(data.offsets.astype(np.int32), pa.int32())
+        return pa.ListArray.from_arrays(offsets, values)
     if column.size:
-        flat = pa.array(np.ascontiguousarray(data).ravel(), type=column.arrow_type.value_type)
+        flat = numbers_to_arrow(np.ascontiguousarray(data).ravel(), kind.value_type)
         return pa.FixedSizeListArray.from_arrays(flat, column.size)
-    if column.name == "t_sensor_ns":
-        return pa.array(data, type=pa.int64(), mask=data == NO_STAMP)
-    return pa.array(data, type=column.arrow_type)
+    if column.kind == "str":
+        return texts_to_arrow(data)
+    valid = data != NO_STAMP if column.name == "t_sensor_ns" else None
+    return numbers_to_arrow(data, kind, valid)
 
 
 def _from_arrow(column: Column, chunked: pa.ChunkedArray) -> ColumnData:
     array = chunked.combine_chunks()
     if isinstance(array, pa.ChunkedArray):
         array = pa.concat_arrays(array.chunks) if array.num_chunks else pa.array([], array.type)
+    if column.kind == "str":
+        return texts_from_arrow(array)
+    dtype = _DTYPES[column.kind]
     if column.kind.startswith("list_"):
-        offsets = np.asarray(array.offsets, dtype=np.int64)
-        values = array.values.slice(offsets[0], offsets[-1] - offsets[0])
-        return Ragged(values.to_numpy(zero_copy_only=False), offsets - offsets[0])
+        offsets = numbers_from_arrow(array.offsets, np.int32).astype(np.int64)
+        values = numbers_from_arrow(array.values, dtype)[offsets[0] : offsets[-1]]
+        return Ragged(values, offsets - offsets[0])
     if column.size:
-        flat = array.flatten().to_numpy(zero_copy_only=False)
-        return np.asarray(flat).reshape((-1, column.size))
-    if column.name == "t_sensor_ns":
-        return np.asarray(array.fill_null(NO_STAMP).to_numpy(zero_copy_only=False))
-    return np.asarray(array.to_numpy(zero_copy_only=False))
+        return numbers_from_arrow(array.flatten(), dtype).reshape((-1, column.size))
+    values = numbers_from_arrow(array, dtype)
+    if column.name == "t_sensor_ns" and array.null_count:
+        return np.where(nulls_from_arrow(array), NO_STAMP, values)
+    return values

@@ -10,37 +10,46 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from slamreplay.bundle.manifest import Manifest
 from slamreplay.bundle.odometry import odometry_track
 from slamreplay.bundle.recoveries import INFERRED, kind_of_recovery, tells_of_every_recovery
 from slamreplay.bundle.schema import TABLES
+from slamreplay.bundle.store import Rows
 from slamreplay.bundle.tables import Table
-from slamreplay.bundle.view import BundleView
+from slamreplay.bundle.view import Bundle, BundleView
 from slamreplay.geometry import se3
 from slamreplay.geometry.times import NO_STAMP
 from slamreplay.geometry.transforms import clean_frame
+from slamreplay.ingest.assembly import Assembly
 from slamreplay.ingest.inferred_clearing import clearings
 from slamreplay.ingest.inferred_motion import Manoeuvre, manoeuvres
 
 #: A robot this near to the end of its plan has come there.
 ARRIVED_M = 0.5
+_READ = ("odometry", "transforms", "commands", "plans")
 _NAMES = {"clear": "clear costmap", "spin": "spin", "backup": "backup"}
 
 
-def with_inferred(view: BundleView, tables: Mapping[str, Table]) -> dict[str, Table]:
+def with_inferred(manifest: Manifest, tables: Mapping[str, Assembly]) -> dict[str, Rows]:
     """The tables, `recoveries` with a row for each recovery inferred.
 
     Args:
-        view: the bundle that the tables will be.
+        manifest: of the bundle that the tables will be.
         tables: on the bundle's clock.
     """
-    told = _kinds_told(view)
+    told = _kinds_told(manifest, tables.get("recoveries"))
     rows: list[tuple[str, int, str, int]] = []
-    if "clear" not in told:
-        rows += [("clear", *row) for row in clearings(view.table("costmaps"))]
-    rows += [(m.kind, m.start_ns, *_source(view, m)) for m in _moves(view) if m.kind not in told]
+    if "clear" not in told and "costmaps" in tables:
+        rows += [("clear", *row) for row in clearings(tables["costmaps"].groups())]
+    if {"spin", "backup"} - told:
+        view = Bundle(manifest, {n: _whole(tables[n]) for n in _READ if n in tables}, {}).view()
+        moves = [move for move in _moves(view) if move.kind not in told]
+        rows += [(move.kind, move.start_ns, *_source(view, move)) for move in moves]
     if not rows:
         return dict(tables)
-    kinds, t_ns, topics, t_log_ns = zip(*sorted(rows, key=lambda row: row[1]), strict=True)
+    kinds, t_ns, topics, t_log_ns = zip(
+        *sorted(rows, key=lambda row: (row[1], row[0])), strict=True
+    )
     columns = {
         "t_ns": np.array(t_ns, dtype=np.int64),
         "t_sensor_ns": np.full(len(rows), NO_STAMP),
@@ -52,17 +61,31 @@ def with_inferred(view: BundleView, tables: Mapping[str, Table]) -> dict[str, Ta
         "source": _texts([INFERRED] * len(rows)),
     }
     schema = TABLES["recoveries"]
-    whole = Table.concat(schema, [view.table("recoveries"), Table(schema, columns)])
+    recorded = [_whole(tables["recoveries"])] if "recoveries" in tables else []
+    whole = Table.concat(schema, [*recorded, Table(schema, columns)])
     return {**tables, "recoveries": whole.sorted_by_time()}
 
 
-def _kinds_told(view: BundleView) -> set[str]:
+def _whole(rows: Assembly) -> Table:
+    """The table in memory, without the covariances: a third of it is nothing else."""
+    nothing = np.full(1, np.nan)
+    return Table(
+        rows.schema,
+        {
+            c.name: np.broadcast_to(nothing, (len(rows), c.size)) if "covariance" in c.name
+            else rows[c.name]
+            for c in rows.schema.columns
+        },
+    )  # fmt: skip
+
+
+def _kinds_told(manifest: Manifest, recoveries: Assembly | None) -> set[str]:
     """Kinds of recoveries that the log tells of, or would have if there had been any."""
-    role = next((r for r in view.manifest.roles if r.role == "recovery"), None)
+    role = next((r for r in manifest.roles if r.role == "recovery"), None)
     if role is not None and tells_of_every_recovery(role.type):
         return set(_NAMES)
-    names = {str(name) for name in view.table("recoveries")["name"]}
-    return {kind_of_recovery(name) for name in (*names, role.topic if role else "")}
+    names = set() if recoveries is None else set(recoveries["name"].tolist())
+    return {kind_of_recovery(str(name)) for name in (*names, role.topic if role else "")}
 
 
 def _moves(view: BundleView) -> Sequence[Manoeuvre]:

@@ -7,6 +7,8 @@ call is not found. What is found is not people who walk off: they are a few cell
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -27,15 +29,23 @@ APART_NS = 5 * NS_PER_S
 OVERLAP = 0.5
 
 
-def clearings(costmaps: Table) -> list[tuple[int, str, int]]:
-    """Time, topic and log time of each costmap that shows a clearing since the one before it."""
+def clearings(costmaps: Iterable[Table]) -> list[tuple[int, str, int]]:
+    """Time, topic and log time of each costmap that shows a clearing since the one before it.
+
+    Args:
+        costmaps: the table part by part, its rows in time order.
+    """
     found = []
-    for topic in sorted(set(costmaps["topic"])):
-        table = costmaps.take(costmaps["topic"] == topic).sorted_by_time()
-        found += [
-            (int(table.t_ns[k]), str(topic), int(table["t_log_ns"][k])) for k in _of_topic(table)
-        ]
-    return found
+    last: dict[str, Table] = {}
+    for part in costmaps:
+        for topic in sorted(set(part["topic"])):
+            table = part.take(part["topic"] == topic)
+            if topic in last:
+                table = Table.concat(table.schema, [last[topic], table])
+            last[topic] = table.take(np.array([len(table) - 1]))
+            times = table.t_ns.tolist(), table["t_log_ns"].tolist()
+            found += [(times[0][k], str(topic), times[1][k]) for k in _of_topic(table)]
+    return sorted(found)
 
 
 def _of_topic(table: Table) -> list[int]:

@@ -34,8 +34,6 @@ DRIVEN_M = 0.3
 #: Samples farther apart than this tell nothing of what was between them.
 SILENCE_NS = NS_PER_S
 _HALF_NS = NS_PER_S // 5
-#: A turn in one direction takes no more of turning than this in all.
-_ONE_WAY = 1.15
 #: Commands are heeded late; so much of either end of a manoeuvre is not compared with them.
 _LATE_NS = 3 * NS_PER_S // 10
 
@@ -72,11 +70,13 @@ def manoeuvres(
     rests = np.array([(t[a], t[b - 1]) for a, b in _runs(still)], dtype=np.int64).reshape(-1, 2)
     steps = np.hypot(*np.diff(pose[:, :2], axis=0).T) * (planar[1:] >= STILL_M_S)
     driven = np.concatenate([[0.0], np.cumsum(steps)]) >= DRIVEN_M
-    spinning = _held(np.abs(turn) > SPIN_ON_RAD_S, (np.abs(turn) > SPIN_OFF_RAD_S) & heard)
+    left, right = (
+        _held(rate > SPIN_ON_RAD_S, (rate > SPIN_OFF_RAD_S) & heard) for rate in (turn, -turn)
+    )
     backing = _held(forward < -BACK_ON_M_S, (forward < -BACK_OFF_M_S) & heard)
     found = [
         Manoeuvre(kind, int(t[a]), int(t[b - 1]))
-        for kind, runs, fits in (("spin", spinning, _is_spin), ("backup", backing, _is_backup))
+        for kind, runs, fits in (("spin", left + right, _is_spin), ("backup", backing, _is_backup))
         for a, b in runs
         if driven[a] and fits(pose[a:b])
     ]
@@ -122,10 +122,9 @@ def _follows(rests: NDArray[np.int64], move: Manoeuvre, min_ns: int) -> bool:
 
 
 def _is_spin(pose: se2.Array) -> bool:
-    turns = np.diff(np.unwrap(pose[:, 2]))
-    whole = abs(float(turns.sum()))
+    heading = np.unwrap(pose[:, 2])
     away = float(np.hypot(*(pose[:, :2] - pose[0, :2]).T).max())
-    return whole >= SPIN_RAD and np.abs(turns).sum() <= _ONE_WAY * whole and away <= SPIN_MOVES_M
+    return bool(abs(heading[-1] - heading[0]) >= SPIN_RAD and away <= SPIN_MOVES_M)
 
 
 def _is_backup(pose: se2.Array) -> bool:

@@ -173,7 +173,7 @@ def no_returns(topics: Sequence[TopicRows]) -> list[Loss]:
         if topic.table != "scans" or not len(topic):
             continue
         ranges = topic.columns["ranges_m"]
-        far = np.repeat(topic.columns["range_max_m"], ranges.lengths)
+        far = ranges.spread(topic.columns["range_max_m"])
         count = int(np.count_nonzero(told_as_range_max(ranges.values, far)))
         if count:
             reason = "beams of exactly range_max are read as beams without a return"

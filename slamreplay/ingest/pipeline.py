@@ -5,12 +5,13 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from slamreplay.bundle.atomic import check_target
 from slamreplay.bundle.manifest import Frames, Loss, Manifest, Role, Source
 from slamreplay.bundle.store import MANIFEST, write_bundle
-from slamreplay.bundle.tables import Table
 from slamreplay.bundle.view import Bundle
+from slamreplay.ingest.assembly import Assembly
 from slamreplay.ingest.cast import settle_cast
 from slamreplay.ingest.clock import choose_clock, row_times
 from slamreplay.ingest.inferred import with_inferred
@@ -51,6 +52,19 @@ def ingest(
         OutputError: the target is somebody else's, or cannot be written.
     """
     check_target(target, MANIFEST)
+    # Beside the target, for /tmp may be memory and what waits there is too large for it.
+    beside = next(folder for folder in target.absolute().parents if folder.exists())
+    with TemporaryDirectory(prefix=f".{target.name}.", dir=beside) as scratch:
+        return _ingest(logs, target, options, progress, Path(scratch))
+
+
+def _ingest(
+    logs: Sequence[Path],
+    target: Path,
+    options: IngestOptions,
+    progress: Callable[[str, float], None] | None,
+    scratch: Path,
+) -> Bundle:
     overrides = read_overrides(options.topics)
     with open_log(logs) as (readers, losses):
         sources = [s for reader in readers for s in reader.sources]
@@ -58,7 +72,8 @@ def ingest(
         names = [c.topic for c in connections]
         if options.robot is None and not overrides:
             refuse_mixture(connections)
-        topics, lost = read_rows(readers, topic_filter(names, options.robot), progress)
+        skip = topic_filter(names, options.robot)
+        topics, lost = read_rows(readers, skip, progress, scratch)
     if options.robot is not None:
         topics = [without_prefix(t, options.robot.strip("/")) for t in topics]
     check_topics(overrides, sorted({t.topic for t in topics}), options.topics)
@@ -99,8 +114,7 @@ def ingest(
         losses=_sorted(losses),
         tables={},
     )
-    tables = with_inferred(Bundle(manifest, tables, {}).view(), tables)
-    write_bundle(target, manifest, tables, layers.grids)
+    write_bundle(target, manifest, with_inferred(manifest, tables), layers.grids)
     return Bundle.open(target)
 
 
@@ -135,7 +149,7 @@ def _roles(choices: Mapping[str, Choice]) -> list[Role]:
 
 
 def _present(
-    choices: Mapping[str, Choice], tables: Mapping[str, Table], frames: Frames
+    choices: Mapping[str, Choice], tables: Mapping[str, Assembly], frames: Frames
 ) -> set[str]:
     """The parts of a replay bundle that are there."""
     named = {"scan": "scans"}
@@ -152,11 +166,11 @@ def _present(
 
 def _sorted(losses: Sequence[Loss]) -> list[Loss]:
     """Losses of one kind and reason added up, in a fixed order."""
-    counts: dict[tuple[str, str, str], int] = {}
+    found: dict[tuple[str, str, str], Loss] = {}
     for loss in losses:
         key = (loss.kind, loss.what, loss.reason)
-        counts[key] = counts.get(key, 0) + loss.count
-    return [
-        Loss(kind=kind, what=what, count=count, reason=reason)  # type: ignore[arg-type]
-        for (kind, what, reason), count in sorted(counts.items())
-    ]
+        before = found.get(key)
+        if before is not None:
+            loss = loss.model_copy(update={"count": before.count + loss.count})
+        found[key] = loss
+    return [found[key] for key in sorted(found)]

@@ -92,6 +92,8 @@ def choose_scan(topics: Sequence[TopicRows]) -> Choice | None:
     found = [t for t in topics if t.table == "scans" and len(t)]
     if not found:
         return None
+    if len(found) == 1:
+        return Choice(found[0], "sensor_msgs/LaserScan, the only one")
     beams = {id(t): valid_beams(t) for t in found}
     most = max(beams.values())
     close = [t for t in found if beams[id(t)] >= 0.9 * most]
@@ -101,10 +103,8 @@ def choose_scan(topics: Sequence[TopicRows]) -> Choice | None:
         return ("scan" in basename(t.topic), -len(tokens(t.topic)), -delay, beams[id(t)])
 
     chosen = max(close, key=lambda t: (*rank(t), t.topic))
-    reason = "sensor_msgs/LaserScan, the only one"
-    if len(found) > 1:
-        tied = f", one of {len(close)} alike, the plainest name" if len(close) > 1 else ""
-        reason = f"densest of {len(found)} lasers ({beams[id(chosen)]:.0f} valid beams{tied})"
+    tied = f", one of {len(close)} alike, the plainest name" if len(close) > 1 else ""
+    reason = f"densest of {len(found)} lasers ({beams[id(chosen)]:.0f} valid beams{tied})"
     return Choice(chosen, reason)
 
 
@@ -244,8 +244,8 @@ def _correction(topics: Sequence[TopicRows], frames: Frames) -> TopicRows | None
 def valid_beams(topic: TopicRows) -> float:
     """Beams of all scans within their range limits."""
     ranges = topic.columns["ranges_m"]
-    far = np.repeat(topic.columns["range_max_m"], ranges.lengths)
-    near = np.repeat(topic.columns["range_min_m"], ranges.lengths)
+    far = ranges.spread(topic.columns["range_max_m"])
+    near = ranges.spread(topic.columns["range_min_m"])
     with np.errstate(invalid="ignore"):
         inside = (ranges.values >= near) & (ranges.values <= far) & (ranges.values > 0)
     inside &= ~told_as_range_max(ranges.values, far)

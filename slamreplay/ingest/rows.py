@@ -2,25 +2,25 @@
 
 from __future__ import annotations
 
-import struct
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from slamreplay.bundle.manifest import Loss
-from slamreplay.bundle.tables import Ragged
+from slamreplay.bundle.tables import Ragged, concatenated
 from slamreplay.errors import LogError
 from slamreplay.geometry.times import Times
 from slamreplay.ingest import DECODERS
-from slamreplay.ingest.decoders.decoder import Decoder, Messages
-from slamreplay.ingest.readers.reader import Connection, Reader
-from slamreplay.ingest.types import deserialiser
-
-#: Payload bytes of one topic that are held before they are decoded.
-_BATCH_BYTES = 32_000_000
+from slamreplay.ingest.decoders.decoder import Decoder, FieldError, Messages
+from slamreplay.ingest.readers.reader import Block, Connection, Reader
+from slamreplay.ingest.spill import MEMORY_BYTES, SpilledColumns
+from slamreplay.ingest.types import layouts
+from slamreplay.ingest.wire.read import read_messages
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,6 +49,11 @@ class TopicRows:
         return len(self.t_log_ns)
 
     @property
+    def nbytes(self) -> int:
+        """Bytes of the columns."""
+        return sum(c.nbytes for c in self.columns.values()) + 3 * self.t_log_ns.nbytes
+
+    @property
     def rate_hz(self) -> float:
         """Messages per second of log time, 0 where it cannot be said."""
         span = float(self.t_log_ns[-1] - self.t_log_ns[0]) / 1e9 if len(self) > 1 else 0.0
@@ -68,15 +73,15 @@ class TopicRows:
 
     def frame(self, column: str = "frame_id") -> str:
         """The frame most rows have in a column, "" where there is none."""
-        names, counts = np.unique(self.columns.get(column, np.array([], str)).astype(str),
-                                  return_counts=True)  # fmt: skip
-        return str(names[np.argmax(counts)]) if len(names) else ""
+        counts = Counter(self.columns[column].tolist()) if column in self.columns else {}
+        return str(max(sorted(counts), key=counts.__getitem__)) if counts else ""
 
 
 def read_rows(
     readers: Sequence[Reader],
     skip: Callable[[str], str | None],
     progress: Callable[[str, float], None] | None,
+    spill: Path | None = None,
 ) -> tuple[list[TopicRows], list[Loss]]:
     """Rows of every topic with a decoder, sorted by topic and type, and everything left out.
 
@@ -84,30 +89,35 @@ def read_rows(
         readers: the log's containers.
         skip: why a topic is not wanted, None if it is.
         progress: told the share of messages read.
+        spill: an empty folder for the columns of logs that are larger than memory; without one
+            everything stays in memory.
     """
     losses: list[Loss] = []
-    parts: dict[tuple[str, str], list[TopicRows]] = {}
+    store = Store(spill)
     total = max(sum(c.count for reader in readers for c in reader.connections), 1)
     read = 0
     for reader in readers:
-        batches = _batches(reader, skip, losses)
-        for index, t_log_ns, data in reader.messages(set(batches)):
-            read += 1
-            if progress is not None and read % 2000 == 0:
+        topics = _topics(reader, skip, losses)
+        for block in reader.blocks(set(topics)):
+            order = np.argsort(block.connection, kind="stable")
+            ends = np.cumsum(np.bincount(block.connection, minlength=len(reader.connections)))
+            for connection, topic in topics.items():
+                index = order[ends[connection - 1] if connection else 0 : ends[connection]]
+                if len(index):
+                    store.add(topic.decode(block, index))
+            read += len(block)
+            if progress is not None:
                 progress("reading", min(read / total, 1.0))
-            batches[index].add(t_log_ns, data)
-        for batch in batches.values():
-            key = (batch.connection.topic, batch.connection.type)
-            parts.setdefault(key, []).extend(batch.finish(losses))
+        for topic in topics.values():
+            losses.extend(topic.losses())
         losses.extend(reader.losses)
-    rows = [_joined(found) for _, found in sorted(parts.items()) if found]
-    return rows, losses
+    return store.finish(), losses
 
 
-def _batches(
+def _topics(
     reader: Reader, skip: Callable[[str], str | None], losses: list[Loss]
-) -> dict[int, _Batch]:
-    batches = {}
+) -> dict[int, _Topic]:
+    topics = {}
     for connection in reader.connections:
         reason = skip(connection.topic)
         if reason is None and connection.type not in DECODERS:
@@ -116,105 +126,139 @@ def _batches(
             continue
         if reason is None:
             try:
-                batches[connection.index] = _Batch(connection)
+                topics[connection.index] = _Topic(connection)
                 continue
             except LogError as error:
                 reason = str(error)
         what = f"{connection.topic} ({connection.type or connection.encoding})"
         losses.append(Loss(kind="skipped", what=what, count=connection.count, reason=reason))
-    return batches
+    return topics
 
 
-class _Batch:
-    """Payloads of one connection on their way to rows."""
+class _Topic:
+    """One connection on its way from blocks to rows."""
 
     def __init__(self, connection: Connection) -> None:
         self.connection = connection
-        self._deserialise = deserialiser(connection)
+        self._layouts = layouts(connection)
         self._decoder: Decoder = DECODERS.load(connection.type)
-        self._payloads: list[bytes] = []
-        self._times: list[int] = []
-        self._bytes = 0
-        self._broken: list[str] = []
+        self._broken: dict[str, tuple[int, int]] = {}
         self._remarks: dict[tuple[Any, str], int] = {}
-        self._done: list[TopicRows] = []
 
-    def add(self, t_log_ns: int, data: bytes) -> None:
-        self._payloads.append(data)
-        self._times.append(t_log_ns)
-        self._bytes += len(data)
-        if self._bytes > _BATCH_BYTES:
-            self._decode()
+    def decode(self, block: Block, index: NDArray[np.int64]) -> list[TopicRows]:
+        """Rows of the messages of a block at `index`."""
+        t_log_ns = block.t_log_ns[index]
+        unread = np.ones(len(index), dtype=bool)
+        done = []
+        for messages, found in read_messages(
+            block.data, block.start[index], block.end[index], t_log_ns, self.connection.topic,
+            self._layouts, self.connection.encoding,
+        ):  # fmt: skip
+            unread[found] = False
+            done += self._rows(messages)
+        if unread.any():
+            self._lose("its bytes do not fit its type", t_log_ns[unread])
+        return done
 
-    def finish(self, losses: list[Loss]) -> list[TopicRows]:
-        """The decoded rows; what went wrong is added to `losses`."""
-        if self._payloads:
-            self._decode()
-        if self._broken:
-            reason = f"cannot be decoded: {self._broken[0]}"
-            count = len(self._broken)
-            losses.append(Loss(kind="lost", what=self.connection.topic, count=count, reason=reason))
+    def losses(self) -> list[Loss]:
+        """What went wrong, once all is decoded."""
+        what = self.connection.topic
+        found = []
+        for reason, (count, t_log_ns) in self._broken.items():
+            said = f"cannot be decoded: {reason} (first at log time {t_log_ns} ns)"
+            found.append(Loss(kind="lost", what=what, count=count, reason=said))
         for (kind, reason), count in self._remarks.items():
-            losses.append(Loss(kind=kind, what=self.connection.topic, count=count, reason=reason))
-        return self._done
+            found.append(Loss(kind=kind, what=what, count=count, reason=reason))
+        return found
 
-    def _decode(self) -> None:
-        items, times = [], []
-        for t_log_ns, data in zip(self._times, self._payloads, strict=True):
-            try:
-                items.append(self._deserialise(data))
-                times.append(t_log_ns)
-            except (ValueError, KeyError, IndexError, struct.error, _serde_error()) as error:
-                self._broken.append(f"{error} (log time {t_log_ns} ns)")
-        t_log = np.array(times, dtype=np.int64)
-        self._payloads, self._times, self._bytes = [], [], 0
-        if not items:
-            return
+    def _rows(self, messages: Messages) -> list[TopicRows]:
         try:
-            decoded = self._decoder.decode(Messages(items, t_log, self.connection.topic))
-        except AttributeError as error:  # a log may define a type of this name differently
-            self._broken += [f"its definition is another one: {error}"] * len(items)
-            return
+            decoded = self._decoder.decode(messages)
+        except FieldError as error:  # a log may define a type of this name differently
+            self._lose(f"its definition is another one: {error}", messages.t_log_ns)
+            return []
         for remark in decoded.remarks:
             if remark.count:
                 key = (remark.kind, remark.reason)
                 self._remarks[key] = self._remarks.get(key, 0) + remark.count
-        self._done.append(
+        return [
             TopicRows(
                 self.connection.topic,
                 self.connection.type,
-                len(items),
+                len(messages),
                 self._decoder.table,
                 decoded.columns,
                 np.asarray(decoded.t_sensor_ns, dtype=np.int64),
-                t_log[decoded.rows],
+                messages.t_log_ns[decoded.rows],
             )
-        )
+        ]
+
+    def _lose(self, reason: str, t_log_ns: Times) -> None:
+        count, first = self._broken.get(reason, (0, int(t_log_ns[0])))
+        self._broken[reason] = (count + len(t_log_ns), first)
 
 
-def _serde_error() -> type[Exception]:
-    from rosbags.serde import SerdeError
+class Store:
+    """Rows of all topics while a log is read, in memory or, past `MEMORY_BYTES`, on disk.
 
-    return SerdeError
+    Args:
+        folder: for the columns on disk; None to keep everything in memory.
+    """
+
+    def __init__(self, folder: Path | None) -> None:
+        self._folder = folder
+        self._held = 0
+        self._parts: dict[tuple[str, str], list[TopicRows]] = {}
+        self._columns: dict[tuple[str, str], SpilledColumns] = {}
+
+    def add(self, parts: Sequence[TopicRows]) -> None:
+        """Rows of one topic, after those that are there."""
+        for part in parts:
+            key = (part.topic, part.type)
+            self._parts.setdefault(key, []).append(part)
+            self._held += part.nbytes
+            if key in self._columns:
+                self._spill(key)
+        if self._folder is not None and self._held > MEMORY_BYTES:
+            for key in self._parts:
+                self._spill(key)
+            self._held = 0
+
+    def finish(self) -> list[TopicRows]:
+        """One set of rows for each topic and type, sorted by these."""
+        return [_joined(self._parts.pop(key)) for key in sorted(self._parts)]
+
+    def _spill(self, key: tuple[str, str]) -> None:
+        """Put a topic's columns on disk; they stand for all its parts from then on."""
+        parts = self._parts[key]
+        if key not in self._columns and self._folder is not None:
+            self._columns[key] = SpilledColumns(self._folder / str(len(self._columns)))
+        columns = self._columns[key]
+        for part in parts:
+            if part.columns is not columns:
+                columns.append(part.columns, len(part))
+        self._parts[key] = [_times_joined(parts, columns)]
 
 
-def _joined(parts: Sequence[TopicRows]) -> TopicRows:
+def _joined(parts: list[TopicRows]) -> TopicRows:
     """One set of rows, ordered by log time (files of one log may come in any order)."""
-    first = parts[0]
-    whole = replace(
-        first,
-        messages=sum(p.messages for p in parts),
-        columns={k: _concatenate([p.columns[k] for p in parts]) for k in first.columns},
-        t_sensor_ns=np.concatenate([p.t_sensor_ns for p in parts]),
-        t_log_ns=np.concatenate([p.t_log_ns for p in parts]),
-    )
+    columns = parts[0].columns
+    if len(parts) > 1:  # a column at a time, so that no more than one of them is there twice
+        own = [dict(p.columns) for p in parts]
+        names = list(columns)
+        parts[:] = [replace(p, columns={}) for p in parts]
+        columns = {name: concatenated([c.pop(name) for c in own]) for name in names}
+    whole = _times_joined(parts, columns)
+    if (whole.t_log_ns[1:] >= whole.t_log_ns[:-1]).all():
+        return whole
     return whole.take(np.argsort(whole.t_log_ns, kind="stable"))
 
 
-def _concatenate(columns: Iterable[Any]) -> Any:
-    columns = list(columns)
-    if not isinstance(columns[0], Ragged):
-        return np.concatenate(columns)
-    lengths = np.concatenate([c.lengths for c in columns])
-    offsets = np.concatenate([[0], np.cumsum(lengths)]).astype(np.int64)
-    return Ragged(np.concatenate([c.values for c in columns]), offsets)
+def _times_joined(parts: Sequence[TopicRows], columns: Mapping[str, Any]) -> TopicRows:
+    return replace(
+        parts[0],
+        messages=sum(p.messages for p in parts),
+        columns=columns,
+        t_sensor_ns=np.concatenate([p.t_sensor_ns for p in parts]),
+        t_log_ns=np.concatenate([p.t_log_ns for p in parts]),
+    )

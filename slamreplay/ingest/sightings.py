@@ -27,9 +27,9 @@ def tag_sightings(tf: Sequence[TopicRows]) -> list[TopicRows]:
     found = []
     for topic in tf:
         parents, children = topic.columns["parent_frame"], topic.columns["child_frame"]
-        seen = np.array([is_tag_frame(c) for c in children], dtype=bool)
-        seen &= ~np.array([_is_fixed(p) for p in parents], dtype=bool)
-        seen &= ~topic.columns["is_static"]
+        tags = [name for name in set(children) if is_tag_frame(name)]
+        fixed = [name for name in set(parents) if _is_fixed(name)]
+        seen = np.isin(children, tags) & ~np.isin(parents, fixed) & ~topic.columns["is_static"]
         rows = topic.take(np.flatnonzero(seen))
         if not len(rows):
             continue

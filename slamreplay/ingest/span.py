@@ -9,16 +9,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slamreplay.bundle.manifest import Clock, Frames, Loss
-from slamreplay.bundle.tables import Table
 from slamreplay.errors import LogError, UsageError
 from slamreplay.geometry.times import ns
+from slamreplay.ingest.assembly import Assembly
 
 #: Tables whose latest row before the start still holds after it.
 _HOLDING = ("transforms", "poses", "initial_poses", "map_updates")
 
 
 def evidence_span(
-    tables: Mapping[str, Table], frames: Frames, log: Path, losses: Sequence[Loss]
+    tables: Mapping[str, Assembly], frames: Frames, log: Path, losses: Sequence[Loss]
 ) -> tuple[int, int]:
     """First and last time of the evidence; a latched message of the day before does not count.
 
@@ -44,8 +44,11 @@ def evidence_span(
 
 
 def cut(
-    tables: Mapping[str, Table], span: tuple[int, int], start_s: float | None, end_s: float | None
-) -> tuple[dict[str, Table], tuple[int, int]]:
+    tables: Mapping[str, Assembly],
+    span: tuple[int, int],
+    start_s: float | None,
+    end_s: float | None,
+) -> tuple[dict[str, Assembly], tuple[int, int]]:
     """Tables and span between two times, given in seconds after the span's start.
 
     Of what holds until it is replaced (maps, static transforms, the localizer's last word) the
@@ -66,7 +69,7 @@ def cut(
     return {name: _part(table, start, end) for name, table in tables.items()}, (start, end)
 
 
-def clock_between(clock: Clock, tables: Mapping[str, Table]) -> Clock:
+def clock_between(clock: Clock, tables: Mapping[str, Assembly]) -> Clock:
     """The clock with the knots that the tables need, so that a part's manifest stays small."""
     log = [t["t_log_ns"] for t in tables.values() if len(t)]
     if not log or not clock.knots:
@@ -78,7 +81,7 @@ def clock_between(clock: Clock, tables: Mapping[str, Table]) -> Clock:
     return clock.model_copy(update={"knots": knots})
 
 
-def _part(table: Table, start: int, end: int) -> Table:
+def _part(table: Assembly, start: int, end: int) -> Assembly:
     t = table.t_ns
     keep = (t >= start) & (t <= end)
     if table.schema.name == "transforms":
@@ -88,7 +91,7 @@ def _part(table: Table, start: int, end: int) -> Table:
     return table.take(keep)
 
 
-def _latest_before(table: Table, start: int) -> NDArray[np.int64]:
+def _latest_before(table: Assembly, start: int) -> NDArray[np.int64]:
     """The last row before `start` of each topic, or of each edge."""
     before = np.flatnonzero(table.t_ns < start)
     names = [table["topic"].astype(str)]
@@ -100,7 +103,7 @@ def _latest_before(table: Table, start: int) -> NDArray[np.int64]:
     return np.array(sorted(latest.values()), dtype=np.int64)
 
 
-def _moving(tables: Mapping[str, Table], frames: Frames) -> NDArray[np.int64]:
+def _moving(tables: Mapping[str, Assembly], frames: Frames) -> NDArray[np.int64]:
     """Times of the tf edges that carry the base in odom (or what is posed, without an odom)."""
     table = tables.get("transforms")
     if table is None or frames.base is None or frames.odom is None:
@@ -109,5 +112,5 @@ def _moving(tables: Mapping[str, Table], frames: Frames) -> NDArray[np.int64]:
     return np.asarray(table.t_ns[rows & ~table["is_static"]])
 
 
-def _rows(tables: Mapping[str, Table], name: str) -> bool:
+def _rows(tables: Mapping[str, Assembly], name: str) -> bool:
     return name in tables and len(tables[name]) > 0

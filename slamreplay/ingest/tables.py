@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from slamreplay.bundle.schema import TABLES
-from slamreplay.bundle.tables import Ragged, Table
+from slamreplay.bundle.tables import Ragged
 from slamreplay.errors import UsageError
 from slamreplay.geometry.times import Times
+from slamreplay.ingest.assembly import Assembly
 from slamreplay.ingest.rows import TopicRows
 
 _POSED = ("frame_id", "child_frame_id", "position_xyz", "orientation_xyzw")
@@ -46,22 +46,12 @@ def moved(topic: TopicRows, table: str, *, kind: str = "") -> TopicRows:
     return replace(topic, table=table, columns=columns)
 
 
-def build(topics: Sequence[tuple[TopicRows, Times]]) -> dict[str, Table]:
+def build(topics: Sequence[tuple[TopicRows, Times]]) -> dict[str, Assembly]:
     """Tables of all topics, each with its rows' times on the bundle's clock; sorted by time."""
-    parts: dict[str, list[Table]] = {}
+    parts: dict[str, list[tuple[TopicRows, Times]]] = {}
     for topic, t_ns in topics:
-        columns = {
-            "t_ns": t_ns,
-            "t_sensor_ns": topic.t_sensor_ns,
-            "t_log_ns": topic.t_log_ns,
-            "topic": np.full(len(topic), topic.topic, dtype=object),
-            **topic.columns,
-        }
-        parts.setdefault(topic.table, []).append(Table(TABLES[topic.table], columns))
-    return {
-        name: Table.concat(TABLES[name], tables).sorted_by_time()
-        for name, tables in sorted(parts.items())
-    }
+        parts.setdefault(topic.table, []).append((topic, t_ns))
+    return {name: Assembly.of(found) for name, found in sorted(parts.items())}
 
 
 def without_prefix(topic: TopicRows, prefix: str) -> TopicRows:

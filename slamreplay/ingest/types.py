@@ -1,85 +1,114 @@
-"""From payload to message: rosbags' type stores, filled with the log's own definitions."""
+"""What a connection's type looks like, from its own definition or from those that ship here."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Mapping
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
 from slamreplay.errors import LogError
 from slamreplay.ingest.readers.reader import Connection
+from slamreplay.ingest.wire.layout import Struct, UnknownLayoutError, layout_of
 from slamreplay.messages.definitions import DEFINITIONS
 from slamreplay.messages.interfaces import message_definition
-from slamreplay.messages.layouts import likeliest_layout
+from slamreplay.messages.layouts import layouts as shipped_layouts
 
 if TYPE_CHECKING:
     from rosbags.interfaces.typing import Typesdict
-    from rosbags.typesys.store import Typestore
+
+_TIME = "builtin_interfaces/msg/Time"
+_DURATION = "builtin_interfaces/msg/Duration"
 
 
-def deserialiser(connection: Connection) -> Callable[[bytes], Any]:
-    """The function that turns a connection's payloads into messages.
+def layouts(connection: Connection) -> list[Struct]:
+    """What a connection's messages may look like on the wire, in the order to try them.
 
-    The log's own definition wins; each definition has a store of its own, so that two layouts of
-    one type in one log do not meet. Without one, ROS 2's types and `slamreplay.messages` are used.
+    The log's own definition wins, and is read apart from all others, so that two layouts of one
+    type in one log do not meet. Without one, ROS 2's types and `slamreplay.messages` are used, in
+    every layout that a type has had, the newest first.
 
     Raises:
         LogError: the encoding is unknown here, or the type has no (readable) definition.
     """
     if connection.encoding not in {"ros1", "cdr"}:
         raise LogError(f"messages are encoded as '{connection.encoding or 'unknown'}'")
-    store = _store(connection.encoding, connection.type, connection.definition_format,
-                   connection.definition)  # fmt: skip
-    name = connection.type
-    if connection.encoding == "ros1":
-        return lambda data: store.deserialize_ros1(data, name)
-    return lambda data: store.deserialize_cdr(data, name)
+    name, encoding = connection.type, connection.encoding
+    own = message_definition(name, connection.definition)
+    form = connection.definition_format
+    try:
+        if own:
+            return [layout_of(name, _own(encoding, name, form, own), encoding)]
+        if name in _store(encoding):
+            return [layout_of(name, _with_needed({}, name, encoding), encoding)]
+        known = [_own(encoding, name, "msg", text) for text in shipped_layouts(name)]
+        found = [layout_of(name, definitions, encoding) for definitions in known]
+    except UnknownLayoutError as error:
+        raise LogError(f"its definition cannot be used: {error}") from error
+    if not found:
+        raise LogError("the log has no definition of this type, and neither do we")
+    return found
 
 
 @cache
-def _store(encoding: str, name: str, form: str, text: str) -> Typestore:
-    from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore
+def _own(encoding: str, name: str, form: str, text: str) -> Mapping[str, Any]:
+    from rosbags.typesys import get_types_from_idl, get_types_from_msg
 
-    text = message_definition(name, text) if text else likeliest_layout(name)
-    if not text:
-        store = _shipped(encoding)
-        if name not in store.fielddefs:
-            raise LogError("the log has no definition of this type, and neither do we")
-        return store
-    store = get_typestore(Stores.EMPTY)
-    shipped = _shipped(encoding).fielddefs
     try:
         found = get_types_from_idl(text) if form == "idl" else get_types_from_msg(text, name)
         if "/srv/" in name:  # rosbags knows no names of this form
             found = {name: found.pop(next(iter(found))), **found}
-        while missing := sorted(_needed(found) & set(shipped) - set(found)):
-            # Recorders leave out builtin_interfaces, and odd bags even std_msgs/Header.
-            found |= {t: shipped[t] for t in missing}
-        store.register(found)
-        store.get_msgdef(name)
     except Exception as error:  # a parser of foreign text fails in many ways
         raise LogError(f"its definition cannot be read: {str(error).splitlines()[0]}") from error
-    return store
+    return _with_needed(found, name, encoding)
+
+
+def _with_needed(found: Typesdict, name: str, encoding: str) -> Mapping[str, Any]:
+    """Definitions with those that fields of theirs need and that are not among them.
+
+    Recorders leave out builtin_interfaces, and odd bags even std_msgs/Header.
+    """
+    whole: dict[str, Any] = dict(found)
+    needed = {name, *_needed(whole)}
+    while missing := sorted(needed - set(whole)):
+        for kind in missing:
+            shipped = _shipped(kind, encoding)
+            if shipped is None:
+                raise UnknownLayoutError(f"{kind} is not defined")
+            whole[kind] = shipped
+        needed = _needed(whole)
+    return whole
 
 
 @cache
-def _shipped(encoding: str) -> Typestore:
-    from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+def _shipped(name: str, encoding: str) -> Any:
+    """(constants, fields) of a type that rosbags or `slamreplay.messages` knows, or None."""
+    from rosbags.interfaces import Nodetype
+    from rosbags.typesys import get_types_from_msg
 
-    store = get_typestore(Stores.ROS1_NOETIC if encoding == "ros1" else Stores.ROS2_HUMBLE)
-    missing: Typesdict = {}
-    for name, text in DEFINITIONS.items():
-        if name not in store.fielddefs:
-            missing |= get_types_from_msg(text, name)
-    store.register(missing)
-    return store
+    if name in (_TIME, _DURATION):  # before the stores, which take a while to load
+        seconds = "uint32" if encoding == "ros1" and name == _TIME else "int32"
+        rest = "uint32" if name == _TIME or encoding != "ros1" else "int32"
+        fields = [("sec", seconds), ("nanosec", rest)]
+        return [], [(field, (Nodetype.BASE, (kind, 0))) for field, kind in fields]
+    if (known := _store(encoding).get(name)) is not None:
+        return known
+    text = DEFINITIONS.get(name)
+    return None if text is None else get_types_from_msg(text, name)[name]
 
 
-def _needed(definitions: Typesdict) -> set[str]:
-    """Names of the types that fields of these definitions have, and rosbags' two time types."""
+@cache
+def _store(encoding: str) -> Mapping[str, Any]:
+    from rosbags.typesys import Stores, get_typestore
+
+    kind = Stores.ROS1_NOETIC if encoding == "ros1" else Stores.ROS2_HUMBLE
+    return get_typestore(kind).fielddefs
+
+
+def _needed(definitions: Mapping[str, Any]) -> set[str]:
+    """Names of the types that fields of these definitions have."""
     from rosbags.interfaces import Nodetype
 
-    names = {"builtin_interfaces/msg/Time", "builtin_interfaces/msg/Duration"}
+    names = set()
     for _, fields in definitions.values():
         for _, (kind, args) in fields:
             inner = args[0] if kind in {Nodetype.ARRAY, Nodetype.SEQUENCE} else (kind, args)

@@ -45,12 +45,15 @@ def message_definition(type_name: str, text: str) -> str:
 
     Returns:
         A definition in the form of MCAP and ROS 1 bags, the types it needs appended. Text of any
-        other type, and text that is a message's definition already, comes back as it is.
+        other type, and text that is a message's definition already, comes back as it is; "" where
+        a plain message (an action's status) has the text of an action, which does not define it.
     """
     match = _DERIVED.fullmatch(type_name)
+    if match is None:
+        return "" if _HEADLINE.match(text) else text
     body, *rest = re.split(rf"^{SEPARATOR}", _HEADLINE.sub("", text), flags=re.MULTILINE)
     parts = [_qualified(p, type_name) for p in re.split(r"^---[ \t]*$", body, flags=re.MULTILINE)]
-    if match is None or len(parts) != (2 if match["kind"] == "srv" else 3):
+    if len(parts) != (2 if match["kind"] == "srv" else 3):
         return text
     own = _of_service if match["kind"] == "srv" else _of_action
     sections = own(match["base"], match["part"], parts)

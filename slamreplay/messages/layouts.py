@@ -14,8 +14,6 @@ from slamreplay.messages.interfaces import SEPARATOR, base_interface, message_de
 from slamreplay.messages.recoveries import INTERFACES
 
 _KIND = re.compile(r"^(?:MSG: )?(\w+/\w+|\w+/\w+/\w+)(?:\[[^\]]*\])?[ \t]+\w", re.MULTILINE)
-#: Logs without definitions are of this release or older.
-_WITHOUT_DEFINITIONS = "humble"
 
 
 def layouts(type_name: str) -> list[str]:
@@ -32,19 +30,6 @@ def layouts(type_name: str) -> list[str]:
         for chosen in product(*(_texts(name) for name in needed))
     ]
     return list(dict.fromkeys(found))
-
-
-def likeliest_layout(type_name: str) -> str:
-    """The layout in which most logs without definitions have a type, "" if it is not shipped.
-
-    For services and actions that is Humble's, or their first.
-    """
-    releases = INTERFACES.get(base_interface(type_name))
-    if releases is None:
-        return ""
-    texts = list(releases.items())
-    text = next((t for name, t in texts if name <= _WITHOUT_DEFINITIONS), texts[-1][1])
-    return message_definition(type_name, text)
 
 
 def _texts(type_name: str) -> list[str]:

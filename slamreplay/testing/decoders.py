@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Collection, Iterator, Mapping
+from itertools import accumulate, pairwise
 from types import SimpleNamespace
 from typing import Any
 
@@ -19,7 +20,7 @@ from slamreplay.bundle.tables import Ragged, Table
 from slamreplay.errors import SlamreplayError
 from slamreplay.geometry.times import NO_STAMP
 from slamreplay.ingest.decoders.decoder import Decoded, Decoder, Messages
-from slamreplay.ingest.readers.reader import Connection
+from slamreplay.ingest.readers.reader import Block, Connection
 from slamreplay.ingest.rows import read_rows
 from slamreplay.testing.conformance import ConformanceError, demand
 
@@ -187,9 +188,11 @@ class _Payloads:
         self.losses: list[Loss] = []
         self._payloads = payloads
 
-    def messages(self, wanted: Collection[int]) -> Iterator[tuple[int, int, bytes]]:
+    def blocks(self, wanted: Collection[int]) -> Iterator[Block]:
         if 0 in wanted:
-            yield from ((0, k, payload) for k, payload in enumerate(self._payloads))
+            ends = [0, *accumulate(len(payload) for payload in self._payloads)]
+            found = [(0, a, b, k) for k, (a, b) in enumerate(pairwise(ends))]
+            yield Block.of(b"".join(self._payloads), found)
 
 
 def _read(type_name: str, payloads: list[bytes], encoding: str) -> tuple[list[Any], list[Loss]]:

@@ -38,6 +38,8 @@ def kept(
     remarks: tuple[Remark, ...],
 ) -> Decoded:
     """The rows (N,) under the mask `keep`, of every column."""
+    if keep.all():
+        return Decoded(dict(columns), rows, t_sensor_ns, remarks)
     index = np.flatnonzero(keep)
     taken = {k: v.take(index) if isinstance(v, Ragged) else v[index] for k, v in columns.items()}
     return Decoded(taken, rows[index], t_sensor_ns[index], remarks)

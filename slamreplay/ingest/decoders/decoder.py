@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from operator import attrgetter
@@ -16,8 +16,15 @@ from slamreplay.geometry.times import NO_STAMP, Times, stamp_ns
 from slamreplay.geometry.transforms import clean_frame
 
 
+class FieldError(AttributeError):
+    """A message type lacks a field, or has one of another kind under its name."""
+
+
 class Messages:
     """The messages of one topic, field by field.
+
+    Paths are dotted ("info.resolution"); the empty path is the message itself, for sequences of
+    texts. These are message objects in memory; `ingest.wire` reads the same from bytes.
 
     Args:
         items: deserialised messages, in the order they were read: objects with the fields of the
@@ -34,10 +41,6 @@ class Messages:
     def __len__(self) -> int:
         return len(self._items)
 
-    def __iter__(self) -> Iterator[Any]:
-        """The messages one by one, for types whose layout is inside the message."""
-        return iter(self._items)
-
     def has(self, path: str) -> bool:
         """Whether the message definition has the field (False where there are no messages)."""
         value = self._items[0] if len(self) else None
@@ -48,8 +51,8 @@ class Messages:
         return True
 
     def column(self, path: str, dtype: Any = np.float64) -> NDArray[Any]:
-        """(N,) a scalar field; `path` is dotted ("info.resolution")."""
-        get = attrgetter(path)
+        """(N,) a scalar field."""
+        get = _getter(path)
         return np.array([get(m) for m in self._items], dtype=dtype)
 
     def columns(self, path: str, names: str) -> NDArray[np.float64]:
@@ -62,18 +65,18 @@ class Messages:
 
     def fixed(self, path: str, size: int) -> NDArray[np.float64]:
         """(N, size) an array field of fixed length."""
-        get = attrgetter(path)
+        get = _getter(path)
         out = np.array([get(m) for m in self._items], dtype=np.float64)
         return out.reshape(-1, size)
 
     def ragged(self, path: str, dtype: Any) -> Ragged:
         """N rows of an array field of any length."""
-        get = attrgetter(path)
+        get = _getter(path)
         return Ragged.of((get(m) for m in self._items), dtype)
 
     def texts(self, path: str) -> NDArray[Any]:
         """(N,) object array of a string field."""
-        get = attrgetter(path)
+        get = _getter(path)
         out = np.empty(len(self), dtype=object)
         out[:] = [get(m) for m in self._items]
         return out
@@ -93,7 +96,7 @@ class Messages:
 
     def children(self, path: str) -> tuple[Messages, NDArray[np.int64]]:
         """Elements of a sequence of structs, all in one, and for each its message's index."""
-        get = attrgetter(path)
+        get = _getter(path)
         lists = [get(m) for m in self._items]
         rows = np.repeat(np.arange(len(lists)), [len(x) for x in lists]).astype(np.int64)
         return Messages([e for x in lists for e in x], self.t_log_ns[rows], self.topic), rows
@@ -107,6 +110,10 @@ class Messages:
     def every(self) -> NDArray[np.int64]:
         """(N,) 0 to N-1: the `rows` of a decoder that makes one row of each message."""
         return np.arange(len(self), dtype=np.int64)
+
+
+def _getter(path: str) -> Callable[[Any], Any]:
+    return attrgetter(path) if path else lambda item: item
 
 
 @dataclass(frozen=True)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -16,9 +14,20 @@ _DTYPES = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 8: "f8
 
 
 def _decode(messages: Messages) -> Decoded:
+    data = messages.ragged("data", np.uint8)
+    fields, rows = messages.children("fields")
+    names, kinds = fields.texts("name"), fields.column("datatype", np.int64)
+    places = fields.column("offset", np.int64)
+    shapes = np.column_stack(
+        [messages.column(n, np.int64) for n in ("height", "width", "row_step", "point_step")]
+    ).reshape(-1, 4)
+    is_big = messages.column("is_bigendian", np.bool_)
+    ends = np.searchsorted(rows, np.arange(len(messages) + 1))
     clouds, readable = [], np.ones(len(messages), dtype=bool)
-    for row, message in enumerate(messages):
-        xyz = _points(message)
+    for row in range(len(messages)):
+        own = slice(ends[row], ends[row + 1])
+        layout = dict(zip(names[own], zip(kinds[own], places[own], strict=True), strict=True))
+        xyz = _points(data[row], layout, shapes[row], ">" if is_big[row] else "<")
         readable[row] = xyz is not None
         clouds.append(np.empty((0, 3), dtype=np.float32) if xyz is None else xyz)
     columns = {"frame_id": messages.frames(), "points_xyz": Ragged.of(clouds, np.float32)}
@@ -26,26 +35,26 @@ def _decode(messages: Messages) -> Decoded:
     return kept(readable, columns, messages.every, messages.stamps(), remarks)
 
 
-def _points(message: Any) -> NDArray[np.float32] | None:
-    fields = {f.name: f for f in message.fields}
-    if not {"x", "y", "z"} <= set(fields):
+def _points(
+    data: NDArray[np.uint8],
+    layout: dict[str, tuple[int, int]],
+    shape: NDArray[np.int64],
+    order: str,
+) -> NDArray[np.float32] | None:
+    """(M, 3) finite points of one cloud; None where its layout does not fit its bytes."""
+    if not {"x", "y", "z"} <= set(layout):
         return None
-    order = ">" if message.is_bigendian else "<"
+    height, width, row_step, point_step = (int(n) for n in shape)
     try:
-        layout = np.dtype(
+        point = np.dtype(
             {
                 "names": ["x", "y", "z"],
-                "formats": [order + _DTYPES[fields[n].datatype] for n in "xyz"],
-                "offsets": [fields[n].offset for n in "xyz"],
-                "itemsize": message.point_step,
+                "formats": [order + _DTYPES[int(layout[n][0])] for n in "xyz"],
+                "offsets": [int(layout[n][1]) for n in "xyz"],
+                "itemsize": point_step,
             }
         )
-        cells = np.ndarray(
-            (message.height, message.width),
-            layout,
-            np.ascontiguousarray(message.data, dtype=np.uint8),
-            strides=(message.row_step, message.point_step),
-        ).ravel()
+        cells = np.ndarray((height, width), point, data, strides=(row_step, point_step)).ravel()
     except (KeyError, TypeError, ValueError):
         return None
     xyz = np.column_stack([cells[n].astype(np.float32) for n in "xyz"])

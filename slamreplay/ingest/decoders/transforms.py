@@ -13,9 +13,7 @@ def _decode(messages: Messages) -> Decoded:
     translation = edges.columns("transform.translation", "xyz")
     rotation, keep, remarks = pose_rows(translation, edges.columns("transform.rotation", "xyzw"))
     parents, children = edges.frames(), edges.frames("child_frame_id")
-    named = np.array(
-        [p != c and bool(p) and bool(c) for p, c in zip(parents, children, strict=True)], dtype=bool
-    )
+    named = (parents != children) & (parents != "") & (children != "")
     columns = {
         "parent_frame": parents,
         "child_frame": children,

@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+import numpy as np
 import yaml
 
 from slamreplay.bundle.manifest import Loss, Source
 from slamreplay.errors import LogError
 from slamreplay.ingest.readers import mcap_file, ros1, sqlite_file
-from slamreplay.ingest.readers.reader import Reader
+from slamreplay.ingest.readers.reader import Block, Reader
 
 _ZSTD = b"\x28\xb5\x2f\xfd"
 _KINDS: list[tuple[bytes, str, Callable[[Path, Source], Reader]]] = [
@@ -122,21 +123,37 @@ class _Decompressing:
 
     def __init__(self, inner: Reader) -> None:
         self._inner = inner
+        self._broken = 0
         self.sources, self.connections = inner.sources, inner.connections
-        self.losses = inner.losses
 
-    def messages(self, wanted: Any) -> Iterator[tuple[int, int, bytes]]:
+    @property
+    def losses(self) -> list[Loss]:
+        """See `Reader`."""
+        if not self._broken:
+            return self._inner.losses
+        what = f"{self.sources[0].name}: messages"
+        own = Loss(kind="lost", what=what, count=self._broken, reason="not zstd")
+        return [*self._inner.losses, own]
+
+    def blocks(self, wanted: Collection[int]) -> Iterator[Block]:
+        """See `Reader`."""
         import zstandard
 
-        broken = 0
-        for index, t_log_ns, data in self._inner.messages(wanted):
-            try:
-                yield index, t_log_ns, zstandard.ZstdDecompressor().decompressobj().decompress(data)
-            except zstandard.ZstdError:
-                broken += 1
-        if broken:
-            what = f"{self.sources[0].name}: messages"
-            self.losses.append(Loss(kind="lost", what=what, count=broken, reason="not zstd"))
+        self._broken = 0
+        for block in self._inner.blocks(wanted):
+            whole, payloads = [], []
+            view = memoryview(block.data.data)
+            for k, (a, b) in enumerate(zip(block.start.tolist(), block.end.tolist(), strict=True)):
+                try:
+                    stream = zstandard.ZstdDecompressor().decompressobj()
+                    payloads.append(stream.decompress(view[a:b]))
+                    whole.append(k)
+                except zstandard.ZstdError:
+                    self._broken += 1
+            end = np.cumsum([len(p) for p in payloads], dtype=np.int64)
+            data = np.frombuffer(b"".join(payloads), dtype=np.uint8)
+            start = np.concatenate([[0], end[:-1]]).astype(np.int64)
+            yield Block(data, block.connection[whole], start, end, block.t_log_ns[whole])
 
 
 def _head(path: Path) -> bytes:

@@ -1,31 +1,45 @@
-"""ROS 1 bags, version 2.0, read from front to back.
-
-The format (wiki.ros.org/Bags/Format/2.0): records of a header (length, then length-prefixed
-`name=value` fields) and data. Chunks hold connections and messages. The index at the end is used
-for message counts only, so that a bag that was never closed reads like any other.
-"""
+"""ROS 1 bags, version 2.0: chunks by their index, in threads; unclosed and cut bags as well."""
 
 from __future__ import annotations
 
-import bz2
 import struct
-from collections import Counter
 from collections.abc import Collection, Iterator
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import BinaryIO
+
+import numpy as np
 
 from slamreplay.bundle.manifest import Loss, Source
 from slamreplay.errors import LogError
 from slamreplay.geometry.times import NS_PER_S
-from slamreplay.ingest.readers.reader import Connection, normalise_type
+from slamreplay.ingest.readers import ros1_records as r
+from slamreplay.ingest.readers.compression import Bytes, decompress
+from slamreplay.ingest.readers.damage import Damage
+from slamreplay.ingest.readers.positioned import read_at
+from slamreplay.ingest.readers.reader import Block
+from slamreplay.ingest.readers.ros1_scan import Chunk, codec_of, cut_content, from_index, from_scan
+from slamreplay.ingest.readers.windows import compact, loaded
+from slamreplay.ingest.wire.places import gather
 
 MAGIC = b"#ROS"  # "#ROSBAG V2.0", and "#ROSRECORD V1.2" of the years before 2010
-_MESSAGE, _INDEX, _CHUNK, _CONNECTION = 2, 4, 5, 7
-_Header = dict[bytes, bytes]
+
+
+@dataclass(frozen=True)
+class _Loaded:
+    """A chunk that was read: its wanted messages, and what was wrong."""
+
+    chunk: Chunk
+    block: Block | None
+    problem: str = ""
+    is_index_wrong: bool = False
 
 
 class Ros1Reader:
     """One .bag file.
+
+    A damaged chunk is lost and counted, the whole messages before the damage are kept; a bag that
+    was cut is read up to the cut.
 
     Raises:
         LogError: another version of the format, or nothing readable in it.
@@ -33,168 +47,174 @@ class Ros1Reader:
 
     def __init__(self, path: Path, source: Source) -> None:
         self.sources = (source,)
-        self.losses: list[Loss] = []
         self._path = path
         with path.open("rb") as stream:
             magic = stream.readline(64)
-        if magic.strip() != b"#ROSBAG V2.0":
+        if magic.strip() != r.MAGIC.strip():
             version = magic.decode("ascii", "replace").strip().lstrip("#")
             raise LogError(
                 f"bag format '{version}' is not supported",
                 where=path,
                 hint="convert it with 'rosbag fix' of ROS 1",
             )
-        self._start = len(magic)
-        self._ids: dict[int, int] = {}  # connection ids of the bag to ours
-        self._found: list[Connection] = []
-        counts = self._scan()
+        self._damage = Damage(path.name)
+        self._contents = from_index(path) or from_scan(path, self._damage)
+        self._scanned = self._damage.losses()
+        counts = self._contents.counts
         self.connections = tuple(
-            Connection(c.index, c.topic, c.type, "ros1", c.definition, "msg", counts[c.index])
-            for c in self._found
+            replace(connection, count=counts[number])
+            for number, connection in self._contents.connections.items()
         )
-        self.losses.clear()  # `messages` passes the same damage again
+        if not self.connections and self._scanned:
+            raise LogError(self._scanned[0].reason, where=path)
 
-    def messages(self, wanted: Collection[int]) -> Iterator[tuple[int, int, bytes]]:
+    @property
+    def losses(self) -> list[Loss]:
         """See `Reader`."""
-        self.losses.clear()
-        for header, data in self._records():
-            if header[b"op"][0] != _CHUNK:
-                continue
-            for inner, payload in self._chunk(header, data):
-                if inner[b"op"][0] != _MESSAGE:
-                    continue
-                index = self._ids.get(_u32(inner[b"conn"]))
-                if index is not None and index in wanted:
-                    sec, nsec = struct.unpack("<II", inner[b"time"])
-                    yield index, sec * NS_PER_S + nsec, payload
+        last = {"last_good_ns": self._damage.last_good_ns}
+        return [*(s.model_copy(update=last) for s in self._scanned), *self._damage.losses()]
 
-    def _scan(self) -> Counter[int]:
-        """Messages of each connection: from index records where they are, else by reading all."""
-        counts: Counter[int] = Counter()
-        for header, data in self._records():
-            op = header[b"op"][0]
-            if op == _CONNECTION:
-                self._learn(header, data)
-            elif op == _INDEX:
-                counts[_u32(header[b"conn"])] += _u32(header[b"count"])
-        if not self.losses and self._found and set(counts) <= set(self._ids):
-            return Counter({self._ids[number]: count for number, count in counts.items()})
-        return self._scan_chunks()
-
-    def _scan_chunks(self) -> Counter[int]:
-        counts: Counter[int] = Counter()
-        for header, data in self._records():
-            records = self._chunk(header, data) if header[b"op"][0] == _CHUNK else ()
-            for inner, payload in records:
-                if inner[b"op"][0] == _CONNECTION:
-                    self._learn(inner, payload)
-                elif inner[b"op"][0] == _MESSAGE:
-                    counts[self._ids.get(_u32(inner[b"conn"]), -1)] += 1
-        return counts
-
-    def _learn(self, header: _Header, data: bytes) -> None:
-        number = _u32(header[b"conn"])
-        if number in self._ids:
-            return
-        fields = _fields(data)
-        topic = header.get(b"topic", fields.get(b"topic", b"")).decode("utf-8", "replace")
-        kind = normalise_type(fields.get(b"type", b"").decode("utf-8", "replace"))
-        text = fields.get(b"message_definition", b"").decode("utf-8", "replace")
-        self._ids[number] = len(self._found)
-        self._found.append(Connection(len(self._found), topic, kind, "ros1", text, "msg", 0))
-
-    def _records(self) -> Iterator[tuple[_Header, bytes]]:
-        """Records of the file; a cut or broken tail ends them and becomes a loss."""
-        size = self._path.stat().st_size
+    def blocks(self, wanted: Collection[int]) -> Iterator[Block]:
+        """See `Reader`."""
+        self._damage.clear()
+        contents = self._contents
+        indices = {n: c.index for n, c in contents.connections.items() if c.index in wanted}
+        table = np.full(max(indices, default=0) + 1, -1, dtype=np.int64)
+        for number, index in indices.items():
+            table[number] = index
+        lost = read = 0
         with self._path.open("rb") as stream:
-            stream.seek(self._start)
-            while (position := stream.tell()) < size:
-                try:
-                    header = _fields(_block(stream.read(4), stream, size))
-                    data = _block(stream.read(4), stream, size)
-                    _check(header)
-                except (ValueError, struct.error) as error:
-                    reason = f"broken at byte {position}: {error}"
-                    what = f"{self._path.name}: bytes"
-                    self.losses.append(
-                        Loss(kind="lost", what=what, count=size - position, reason=reason)
-                    )
-                    return
-                yield header, data
+            for window in loaded(
+                contents.chunks, lambda c: c.size, lambda c: _load(stream, c, table)
+            ):
+                for part in window:
+                    lost += bool(part.problem)
+                    self._tell(part)
+                blocks = [p.block for p in window if p.block is not None and len(p.block)]
+                if blocks:
+                    block = Block.joined(blocks)
+                    read += len(block)
+                    yield block
+        if contents.cut is not None:
+            block, _ = _by_walking(cut_content(self._path, contents.cut), table)
+            if len(block):
+                self._damage.good(int(block.t_log_ns.max()))
+            reason = f"the file is cut within a chunk; {len(block)} messages of it could be read"
+            left = self._path.stat().st_size - contents.cut
+            self._damage.lose("chunks", reason, at=contents.cut, size=left)
+            read += len(block)
+            if len(block):
+                yield block
+        missing = sum(contents.counts[number] for number in indices) - read
+        if missing > 0 and lost:
+            self._damage.count_messages(missing)
+        elif missing > 0:
+            self._damage.lose("messages", "its index counts more than it holds", count=missing)
 
-    def _chunk(self, header: _Header, data: bytes) -> Iterator[tuple[_Header, bytes]]:
-        """Records of one chunk; a damaged one is lost as a whole."""
-        compression = header.get(b"compression", b"none").decode("ascii", "replace")
-        records = []
-        try:
-            raw = _decompress(data, compression)
-            at = 0
-            while at < len(raw):
-                fields, at = _slice(raw, at)
-                payload, at = _slice(raw, at)
-                record = _fields(fields)
-                _check(record)
-                records.append((record, payload))
-        except (ValueError, OSError, RuntimeError, EOFError, struct.error) as error:
-            reason = f"damaged chunk ({compression}): {error}"
-            what = f"{self._path.name}: chunks"
-            self.losses.append(Loss(kind="lost", what=what, count=1, reason=reason))
-        yield from records
-
-
-def _decompress(data: bytes, compression: str) -> bytes:
-    if compression == "none":
-        return data
-    if compression == "bz2":
-        return bz2.decompress(data)
-    if compression == "lz4":
-        import lz4.frame  # type: ignore[import-untyped]
-
-        return bytes(lz4.frame.decompress(data))
-    raise ValueError(f"unknown compression '{compression}'")
+    def _tell(self, part: _Loaded) -> None:
+        if part.problem:
+            size = part.chunk.end - part.chunk.start
+            self._damage.lose("chunks", part.problem, at=part.chunk.start, size=size)
+        elif part.is_index_wrong:
+            self._damage.mend("chunks", "the index of the chunk is wrong; read without it")
+        if part.block is not None and len(part.block):
+            self._damage.good(int(part.block.t_log_ns.max()))
 
 
-def _block(length: bytes, stream: BinaryIO, size: int) -> bytes:
-    count = _u32(length)
-    if count > size:
-        raise ValueError(f"a length of {count} bytes")
-    data = stream.read(count)
-    if len(data) < count:
-        raise ValueError("the file ends within a record")
-    return data
+def _load(stream: BinaryIO, chunk: Chunk, table: np.ndarray) -> _Loaded:
+    """Read and decompress one chunk; called in threads."""
+    raw = memoryview(read_at(stream, chunk.start, chunk.end - chunk.start))
+    codec = "none"
+    try:
+        begin = 4 + r.u32(raw)
+        header = r.fields(raw[4:begin])
+        if r.opcode(header) != r.CHUNK:
+            return _Loaded(chunk, None, "there is no chunk where the index says")
+        end = begin + 4 + r.u32(raw, begin)
+        codec = codec_of(header)
+        content = decompress(raw[begin + 4 : end], codec, r.u32(header[b"size"]))
+    except (ValueError, struct.error) as error:
+        return _Loaded(chunk, None, f"damaged chunk ({codec}): {error}")
+    block = _by_index(content, raw[end:], table)
+    if block is not None:
+        return _Loaded(chunk, compact(block))
+    block, problem = _by_walking(content, table)
+    if problem:
+        return _Loaded(chunk, compact(block), f"damaged chunk ({codec}): {problem}")
+    return _Loaded(chunk, compact(block), is_index_wrong=end < len(raw))
 
 
-def _slice(raw: bytes, at: int) -> tuple[bytes, int]:
-    end = at + 4 + _u32(raw[at : at + 4])
-    if end > len(raw):
-        raise ValueError("a record is longer than its chunk")
-    return raw[at + 4 : end], end
+def _by_index(content: Bytes, index: Bytes, table: np.ndarray) -> Block | None:
+    """Wanted messages where the chunk's index records put them; None where these are wrong."""
+    data = np.frombuffer(content, dtype=np.uint8)
+    found = []
+    try:
+        for header, begin, end in r.records(index):
+            number = r.u32(header[b"conn"]) if r.opcode(header) == r.INDEX else -1
+            if not 0 <= number < len(table):
+                continue
+            places = r.index_offsets(index[begin:end], r.u32(header[b"count"]))
+            block = _messages(data, places, number)
+            if block is None:
+                return None
+            found.append(replace(block, connection=np.full(len(block), table[number])))
+    except (ValueError, struct.error):
+        return None
+    if not found:
+        return None
+    start = np.concatenate([b.start for b in found])
+    connection = np.concatenate([b.connection for b in found])
+    order = np.argsort(start, kind="stable")
+    order = order[connection[order] >= 0]
+    return Block(
+        data,
+        connection[order],
+        start[order],
+        np.concatenate([b.end for b in found])[order],
+        np.concatenate([b.t_log_ns for b in found])[order],
+    )
 
 
-def _fields(data: bytes) -> _Header:
-    out, at = {}, 0
-    while at < len(data):
-        field, at = _slice(data, at)
-        name, found, value = field.partition(b"=")
-        if not found:
-            raise ValueError("a header field without '='")
-        out[name] = value
-    return out
+def _messages(data: np.ndarray, at: np.ndarray, number: int) -> Block | None:
+    """The message records of one connection at `at` (N,); None where one of them is none.
+
+    Their headers are alike but for the time, so that the first one tells where its fields are.
+    """
+    if not len(at) or at.max() + 4 > len(data):
+        return None
+    lengths = gather(data, at, 0, 4).view("<u4")[:, 0]
+    length = int(lengths[0])
+    if (lengths != length).any() or at.max() + 8 + length > len(data):
+        return None
+    heads = gather(data, at, 4, length)
+    first = heads[0].tobytes()
+    header = r.fields(first)
+    if r.opcode(header) != r.MESSAGE or r.u32(header[b"conn"]) != number:
+        return None
+    time = first.find(b"\x0d\x00\x00\x00time=") + 9
+    alike = heads == heads[0]
+    alike[:, time : time + 8] = True
+    if not alike.all():
+        return None
+    seconds = np.ascontiguousarray(heads[:, time : time + 8]).view("<u4").astype(np.int64)
+    sizes = gather(data, at, 4 + length, 4).view("<u4")[:, 0].astype(np.int64)
+    start = at + 8 + length
+    if np.any(start + sizes > len(data)):
+        return None
+    t_log_ns = seconds[:, 0] * NS_PER_S + seconds[:, 1]
+    return Block(data, np.zeros(len(at), dtype=np.int64), start, start + sizes, t_log_ns)
 
 
-def _check(header: _Header) -> None:
-    """Raise ValueError where a record lacks the fields that its kind is read by."""
-    op = header.get(b"op", b"")
-    sizes = {b"op": 1}
-    if op == bytes([_MESSAGE]):
-        sizes |= {b"conn": 4, b"time": 8}
-    elif op == bytes([_INDEX]):
-        sizes |= {b"conn": 4, b"count": 4}
-    elif op == bytes([_CONNECTION]):
-        sizes |= {b"conn": 4}
-    if any(len(header.get(name, b"")) != size for name, size in sizes.items()):
-        raise ValueError("a record lacks fields")
-
-
-def _u32(data: bytes) -> int:
-    return int(struct.unpack("<I", data)[0])
+def _by_walking(content: Bytes, table: np.ndarray) -> tuple[Block, str]:
+    """Wanted messages record by record, and what ended the walk before the content did."""
+    found = []
+    problem = ""
+    try:
+        for header, begin, end in r.records(content):
+            if r.opcode(header) == r.MESSAGE:
+                number = r.u32(header[b"conn"])
+                if number < len(table) and table[number] >= 0:
+                    found.append((int(table[number]), begin, end, r.stamp_ns(header[b"time"])))
+    except (ValueError, struct.error) as error:
+        problem = str(error)
+    return Block.of(content, found), problem

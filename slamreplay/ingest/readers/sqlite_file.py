@@ -6,15 +6,19 @@ import shutil
 import sqlite3
 from collections.abc import Collection, Iterator
 from contextlib import closing, contextmanager
+from itertools import accumulate
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+import numpy as np
+
 from slamreplay.bundle.manifest import Loss, Source
 from slamreplay.errors import LogError
-from slamreplay.ingest.readers.reader import Connection, normalise_type
+from slamreplay.ingest.readers.reader import WINDOW_BYTES, Block, Connection, normalise_type
 
 MAGIC = b"SQLite format 3\0"
 _FORMATS = {"ros2msg": "msg", "ros2idl": "idl"}
+_ROWS = 1000
 
 
 class SqliteReader:
@@ -60,25 +64,45 @@ class SqliteReader:
             for index, (number, name, kind, encoding) in enumerate(topics)
         )
 
-    def messages(self, wanted: Collection[int]) -> Iterator[tuple[int, int, bytes]]:
+    def blocks(self, wanted: Collection[int]) -> Iterator[Block]:
         """See `Reader`."""
         self.losses.clear()
-        read = 0
+        numbers = [number for number, index in self._indices.items() if index in wanted]
+        read: list[tuple[int, int, bytes]] = []
+        total = size = 0
         try:
             with self._database() as database:
+                among = ", ".join("?" * len(numbers))
                 rows = database.execute(
-                    "SELECT topic_id, timestamp, data FROM messages ORDER BY id"
+                    "SELECT topic_id, timestamp, data FROM messages"  # noqa: S608 - only marks
+                    f" WHERE topic_id IN ({among}) ORDER BY id",
+                    numbers,
                 )
-                for number, t_log_ns, data in rows:
-                    read += 1
-                    index = self._indices.get(number)
-                    if index is not None and index in wanted:
-                        yield index, int(t_log_ns), bytes(data)
+                while found := rows.fetchmany(_ROWS):
+                    read += found
+                    total += len(found)
+                    size += sum(len(row[2]) for row in found)
+                    if size > WINDOW_BYTES:
+                        yield self._block(read)
+                        read, size = [], 0
         except sqlite3.Error as error:
-            left = max(sum(c.count for c in self.connections) - read, 1)
+            left = max(sum(self.connections[i].count for i in wanted) - total, 1)
             reason = f"damaged SQLite file: {error}"
             what = f"{self._path.name}: messages"
             self.losses.append(Loss(kind="lost", what=what, count=left, reason=reason))
+        if read:
+            yield self._block(read)
+
+    def _block(self, rows: list[tuple[int, int, bytes]]) -> Block:
+        numbers, times, payloads = zip(*rows, strict=True)
+        ends = np.array(list(accumulate(map(len, payloads))), dtype=np.int64)
+        return Block(
+            np.frombuffer(b"".join(payloads), dtype=np.uint8),
+            np.array([self._indices[number] for number in numbers], dtype=np.int64),
+            np.concatenate([[0], ends[:-1]]),
+            ends,
+            np.array(times, dtype=np.int64),
+        )
 
     def _counts(self, database: sqlite3.Connection) -> dict[int, int]:
         try:
