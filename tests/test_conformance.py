@@ -243,14 +243,14 @@ DECODER_LINES = {
     **{
         f"nav2_msgs/action/{action}_FeedbackMessage": counted(
             "number_of_recoveries",
-            {"name": "recovery", "source": "navigation_feedback"},
+            {"name": "recovery 2", "source": "navigation_feedback"},
             **PROGRESS,
         )
         for action in ("NavigateToPose", "NavigateThroughPoses")
     },
     **{
         f"{package}/action/DockRobot_FeedbackMessage": counted(
-            "num_retries", {"name": "docking retry"}
+            "num_retries", {"name": "docking retry 2"}
         )
         for package in ("nav2_msgs", "opennav_docking_msgs")
     },

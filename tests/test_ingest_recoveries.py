@@ -13,8 +13,8 @@ from rosbags.typesys import Stores, get_typestore
 
 from slamreplay.ingest import DECODERS
 from slamreplay.ingest.action_names import action_of, is_recovery, service_of
+from slamreplay.ingest.changes import settle_changes
 from slamreplay.ingest.decoders.decoder import Messages
-from slamreplay.ingest.goals import settle_goals
 from slamreplay.ingest.log_lines import told_in_logs
 from slamreplay.ingest.pipeline import ingest
 from slamreplay.ingest.readers.open_log import open_log
@@ -232,11 +232,15 @@ def test_each_recovery_that_a_navigation_counts_is_a_row(logs):
         logs.make(TO_POSE, goal_id__uuid=uuid(g), feedback__number_of_recoveries=n)
         for g, n in counts
     ]
+    messages = [("/to/_action/feedback", TO_POSE, m, START + k) for k, m in enumerate(items)]
 
-    decoded = decode(TO_POSE, *items)
+    (rows,), _ = settle_changes(rows_of(recorded(logs, messages))[0])
 
-    assert decoded.rows.tolist() == [2, 3, 3, 5]
-    assert set(decoded.columns["source"]) == {"navigation_feedback"}
+    assert [(n, t - START) for n, t in zip(rows.columns["name"], rows.t_log_ns, strict=True)] == [
+        ("recovery 1", 2), ("recovery 2", 3), ("recovery 3", 3), ("recovery 1", 5),
+    ]  # fmt: skip
+    assert set(rows.columns["source"]) == {"navigation_feedback"}
+    assert set(rows.columns["goal"]) == {""}
 
 
 @pytest.mark.parametrize("release", ["lyrical", "kilted", "galactic"])
@@ -263,9 +267,10 @@ def test_navigation_feedback_with_the_text_of_its_action_counts(logs, release):
             writer.add_message(channel, log_time=t_ns, publish_time=t_ns, data=data)
         writer.finish()
 
-    (rows,), losses = rows_of(path)
+    read, losses = rows_of(path)
+    (rows,), _ = settle_changes(read)
 
-    assert told(rows) == [("recovery", "running")] * 2
+    assert told(rows) == [("recovery 1", "running"), ("recovery 2", "running")]
     assert losses == []
 
 
@@ -282,7 +287,7 @@ def test_a_db3_of_humble_is_read_without_any_definition(logs):
 
     assert [(r.topic, told(r)) for r in rows] == [
         ("/behavior_tree_log", [("Spin", "running")]),
-        ("/navigate_to_pose/_action/feedback", []),
+        ("/navigate_to_pose/_action/feedback", [("recovery 0", "running")]),
         ("/spin/_action/feedback", [("spin", "executing")]),
     ]
     assert losses == []
@@ -494,7 +499,7 @@ def test_goals_of_several_files_are_told_of_once_and_history_is_none(logs):
     with open_log(paths) as (readers, _):
         rows, _ = read_rows(readers, lambda _topic: None, None)
 
-    (settled,), losses = settle_goals(rows)
+    (settled,), losses = settle_changes(rows)
 
     assert goals_of(settled) == [
         ("02", "executing"), ("03", "executing"), ("02", "succeeded"),
@@ -502,6 +507,45 @@ def test_goals_of_several_files_are_told_of_once_and_history_is_none(logs):
     assert [(loss.count, loss.reason) for loss in losses] == [
         (1, "goals that had ended before the log began")
     ]
+
+
+@pytest.mark.parametrize("size", [1, 2, 3])
+def test_the_parts_in_which_a_log_is_read_change_nothing(logs, size):
+    state = "nav2_msgs/msg/CollisionMonitorState"
+    arrays = [
+        [(1, 2)],
+        [(1, 6), (2, 1)],
+        [(1, 6), (2, 2)],
+        [(1, 6), (2, 2)],
+        [(1, 6), (2, 6)],
+        [(2, 6)],
+    ]
+    counts, actions = (0, 1, 1, 3, 3, 4), (0, 1, 1, 1, 0, 0)
+    messages = []
+    for k, (array, count, action) in enumerate(zip(arrays, counts, actions, strict=True)):
+        feedback = logs.make(TO_POSE, feedback__number_of_recoveries=count)
+        monitor = logs.make(state, action_type=action)
+        messages += [
+            ("/spin/_action/status", GOAL, statuses(logs, *array), START + k),
+            ("/navigate_to_pose/_action/feedback", TO_POSE, feedback, START + k),
+            ("/collision_monitor_state", state, monitor, START + k),
+        ]
+    parts = [messages[i : i + 3 * size] for i in range(0, len(messages), 3 * size)]
+    paths = [
+        recorded(logs, part).rename(logs.folder / f"{size}_{k}.db3") for k, part in enumerate(parts)
+    ]
+    with open_log(paths) as (readers, _):
+        rows, _ = settle_changes(read_rows(readers, lambda _topic: None, None)[0])
+    counted, goals, monitored = (
+        next(r for r in rows if word in r.topic) for word in ("feedback", "spin", "collision")
+    )
+
+    assert [t - START for t in counted.t_log_ns] == [1, 3, 3, 5]
+    assert [t - START for t in monitored.t_log_ns] == [0, 1, 4]
+    assert goals_of(goals) == [
+        ("01", "executing"), ("01", "preempted"), ("02", "accepted"), ("02", "executing"),
+        ("02", "aborted"),
+    ]  # fmt: skip
 
 
 def moving(logs, n=20):

@@ -61,10 +61,10 @@ def test_one_recovery_that_everybody_tells_of_is_one():
         (4.01, "spin", "accepted", "action", "a"),
         (4.02, "spin", "executing", "action", "a"),
         (4.05, "Running", "running", "log"),
-        (4.1, "recovery", "running", "navigation_feedback"),
+        (4.1, "recovery 1", "running", "navigation_feedback"),
         (9.0, "spin", "succeeded", "action", "a"),
         (9.1, "BackUp", "running", "behavior_tree"),
-        (9.2, "recovery", "running", "navigation_feedback"),
+        (9.2, "recovery 2", "running", "navigation_feedback"),
     ) == [(4.0, "Spin"), (9.1, "BackUp")]
 
 
@@ -74,6 +74,7 @@ def test_a_goal_that_waits_for_its_turn_is_one_recovery_with_its_best_name():
         (1.0, "rotate", "pending", "action", "x"),
         (9.0, "recovery", "active", "action", "x"),
         (12.0, "recovery", "preempting", "action", "x"),
+        (15.0, "spin", "canceling", "action", "y"),
     ) == [(1.0, "rotate")]
 
 
@@ -88,7 +89,8 @@ def test_recoveries_of_one_source_are_not_merged_by_kind():
 
 
 def test_each_count_is_a_recovery_of_its_own():
-    rows = [(t, "recovery", "running", "navigation_feedback") for t in (1.0, 1.0, 1.5)]
+    counts = enumerate((1.0, 1.0, 1.5), start=1)
+    rows = [(t, f"recovery {n}", "running", "navigation_feedback") for n, t in counts]
 
     assert [t for t, _ in found(*rows)] == [1.0, 1.0, 1.5]
 

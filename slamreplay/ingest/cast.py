@@ -9,8 +9,8 @@ from slamreplay.bundle.manifest import Frames, Loss
 from slamreplay.bundle.view import ROLE_TABLES
 from slamreplay.errors import UsageError
 from slamreplay.ingest import roles
+from slamreplay.ingest.changes import settle_changes
 from slamreplay.ingest.frames import direct_pose, find_frames, settle, without_frame
-from slamreplay.ingest.goals import settle_goals
 from slamreplay.ingest.lasers import second_scan
 from slamreplay.ingest.leaks import repeated_reference
 from slamreplay.ingest.log_lines import told_in_logs
@@ -48,7 +48,7 @@ def settle_cast(topics: Sequence[TopicRows], overrides: Mapping[str, str]) -> Ca
         UsageError: a topic's type cannot play the role it was given.
     """
     tf_rows, tree, losses = settle([t for t in topics if t.table == "transforms"])
-    others, ended = settle_goals([t for t in topics if t.table != "transforms"])
+    others, ended = settle_changes([t for t in topics if t.table != "transforms"])
     others += told_in_logs(others)
     losses = [*losses, *ended]
     free = _not_given(others, overrides)

@@ -25,8 +25,6 @@ SAME_NS = 3 * NS_PER_S
 NAVIGATION_NODE = "NavigateRecovery"
 WRAPPERS = ("RecoveryFallback", "RecoveryActions", "ClearingActions")
 _NAVIGATION = (NAVIGATION_NODE, *sorted(NAVIGATIONS))
-#: The source whose rows count recoveries without saying which.
-_COUNT = "navigation_feedback"
 _ABORTED = ("failure", "failed", "aborted")
 _FINISHED = (
     "success", "succeeded", "failure", "failed", "aborted", "canceled", "preempted", "rejected",
@@ -68,7 +66,7 @@ def _once_each(table: Table) -> tuple[Recovery, ...]:
     goals: dict[str, int] = {}
     columns = (table[key].astype(str).tolist() for key in ("name", "source", "goal"))
     for t, name, source, goal in zip(table.t_ns.tolist(), *columns, strict=True):
-        repeated = source != _COUNT and t - last.get(name, t - REPEAT_NS) < REPEAT_NS
+        repeated = t - last.get(name, t - REPEAT_NS) < REPEAT_NS
         last[name] = t
         told = goals.get(goal) if goal else None
         if told is None and not repeated:

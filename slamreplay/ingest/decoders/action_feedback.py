@@ -33,20 +33,12 @@ def _docking(messages: Messages) -> Decoded:
 
 
 def _counted(messages: Messages, field: str, name: str, source: str, stamps: Times) -> Decoded:
-    """One row for each by which a goal's count has grown since the feedback before.
-
-    What a goal's first feedback in the log has counted came before it, and nobody knows when.
-    """
-    count = messages.column(f"feedback.{field}", np.int64)
+    """One row for each count that a goal comes to have; `changes` leaves those that have grown."""
     goal = hexadecimal(messages.fixed("goal_id.uuid", 16))
-    _, number = np.unique(goal.astype(str), return_inverse=True)
-    order = np.argsort(number, kind="stable")
-    same_goal = number[order[1:]] == number[order[:-1]]
-    grown = np.zeros(len(messages), dtype=np.int64)
-    grown[order[1:]] = np.where(same_goal, np.diff(count[order]), 0).clip(min=0)
-    rows = np.repeat(messages.every, grown)
-    columns = recovery_columns(name, "running", "", source, len(rows))
-    return Decoded(columns, rows, stamps[rows])
+    names = np.empty(len(messages), dtype=object)
+    names[:] = [f"{name} {count}" for count in messages.column(f"feedback.{field}", np.int64)]
+    columns = recovery_columns(names, "running", goal, source, len(messages))
+    return kept(first_of_each(goal + "\n" + names), columns, messages.every, stamps, ())
 
 
 BEHAVIOUR = Decoder("recoveries", _behaviour)

@@ -18,14 +18,14 @@ from slamreplay.ingest.decoders.recovery_rows import (
     STATUS,
     STATUS_ROS1,
     Texts,
+    first_of_each,
     hexadecimal,
     recovery_columns,
+    until_ended,
     words,
 )
 
 _LIVE = ("accepted", "executing")
-#: Statuses that a goal keeps.
-FINAL = ("succeeded", "canceled", "aborted", "preempted", "rejected", "recalled", "lost")
 
 
 def _ros2(messages: Messages) -> Decoded:
@@ -48,19 +48,10 @@ def _ros1(messages: Messages) -> Decoded:
 def _changes(
     messages: Messages, rows: NDArray[np.int64], goal: Texts, status: Texts, stamps: Times
 ) -> Decoded:
-    """One row for each goal's first status and for each that differs, until the goal has ended."""
+    """One row for each status that a goal comes to have, until it has ended."""
     action = action_of(messages.topic)
     wanted = is_recovery(action) or action in NAVIGATIONS
-    _, number = np.unique(goal.astype(str), return_inverse=True)
-    order = np.argsort(number, kind="stable")
-    first = np.append(True, number[order[1:]] != number[order[:-1]])[: len(order)]
-    differs = np.append(True, status[order[1:]] != status[order[:-1]])[: len(order)]
-    final = np.isin(status[order].astype(str), FINAL).astype(np.int64)
-    ended_before = np.cumsum(final) - final
-    start = np.flatnonzero(first)
-    ended_before -= np.repeat(ended_before[start], np.diff(np.append(start, len(order))))
-    keep = np.zeros(len(rows), dtype=bool)
-    keep[order] = wanted & (first | differs) & (ended_before == 0)
+    keep = first_of_each(goal + "\n" + status) & until_ended(goal, status) & wanted
     columns = recovery_columns(action, status, goal, "action", len(rows))
     unused = 0 if wanted else len(messages)
     remarks = (Remark("skipped", unused, "goals of an action that is no recovery or navigation"),)

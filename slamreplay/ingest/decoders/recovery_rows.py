@@ -14,6 +14,8 @@ STATUS_ROS1 = (
     "pending", "active", "preempted", "succeeded", "aborted", "rejected", "preempting",
     "recalling", "recalled", "lost",
 )  # fmt: skip
+#: Statuses that a goal keeps.
+FINAL = ("succeeded", "canceled", "aborted", "preempted", "rejected", "recalled", "lost")
 
 
 def recovery_columns(
@@ -38,6 +40,19 @@ def hexadecimal(ids: NDArray[np.float64]) -> Texts:
     """(N,) ids of (N, K) bytes as text."""
     out = np.empty(len(ids), dtype=object)
     out[:] = [row.tobytes().hex() for row in ids.astype(np.uint8)]
+    return out
+
+
+def until_ended(goal: Texts, status: Texts) -> NDArray[np.bool_]:
+    """(N,) whether a goal had not ended before a row, of rows in time order."""
+    _, number = np.unique(goal.astype(str), return_inverse=True)
+    order = np.argsort(number, kind="stable")
+    final = np.isin(status[order].astype(str), FINAL).astype(np.int64)
+    before = np.cumsum(final) - final
+    start = np.flatnonzero(np.append(True, number[order[1:]] != number[order[:-1]])[: len(order)])
+    before -= np.repeat(before[start], np.diff(np.append(start, len(order))))
+    out = np.zeros(len(goal), dtype=bool)
+    out[order] = before == 0
     return out
 
 

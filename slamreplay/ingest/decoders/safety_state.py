@@ -31,9 +31,17 @@ def _monitor(messages: Messages) -> Decoded:
 
 
 def _detector(messages: Messages) -> Decoded:
-    names, seen = messages.ragged("polygons", object), messages.ragged("detections", bool)
-    pairs = (zip(names[i], seen[i], strict=False) for i in range(len(messages)))
-    hit = [[str(polygon) for polygon, is_hit in pair if is_hit] for pair in pairs]
+    polygons, rows = messages.children("polygons")
+    names = polygons.texts("")
+    seen = messages.ragged("detections", bool)
+    # The nth polygon is the one of the nth detection; one without a detection was not looked at.
+    nth = np.arange(len(rows)) - np.searchsorted(rows, rows)
+    looked = nth < seen.lengths[rows]
+    is_hit = np.zeros(len(rows), dtype=bool)
+    is_hit[looked] = seen.values[(seen.offsets[rows] + nth)[looked]]
+    hit: list[list[str]] = [[] for _ in range(len(messages))]
+    for row in np.flatnonzero(is_hit):
+        hit[rows[row]].append(str(names[row]))
     texts = [f"collision detector: points in {', '.join(p) or 'no polygon'}" for p in hit]
     return _changes(messages, "collision_detector", np.array([len(p) for p in hit]), texts)
 
