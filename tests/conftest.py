@@ -75,6 +75,7 @@ class LogWriter:
             if form == Nodetype.BASE:
                 return "" if args[0] == "string" else args[0] == "never" if args[0] == "bool" else 0
             inner, size = args
+            size = size if form == Nodetype.ARRAY else 0  # of a sequence it is the bound
             if inner[0] == Nodetype.BASE and inner[1][0] != "string":
                 return np.zeros(size or 0, dtype=np.dtype(inner[1][0].replace("byte", "uint8")))
             return [value(inner) for _ in range(size or 0)]

@@ -78,8 +78,55 @@ MARKER = {"header": HEADER, "id": 7, "pose": POSED, "confidence": 1.0}
 NODE = {"header": HEADER, "ns": "slam_toolbox", "type": 2, "action": 0, "points": []}
 DRIVE = {"speed": 1.5, "steering_angle": 0.2}
 DRIVEN = {"linear_velocity_xyz": [1.5, 0, 0], "angular_velocity_xyz": [0, 0, np.nan]}
+UUID, OTHER = {"uuid": (7,) * 16}, {"uuid": (8,) * 16}
+NO_GOALS = {"status_list": []}
+GOAL_ID = {"stamp": STAMP, "id": "g"}
+GOAL = {"goal_info": {"goal_id": UUID, "stamp": STAMP}, "status": 6}
+PROGRESS = {"current_pose": {"header": HEADER, "pose": POSE}}
+ENDED = {"header": HEADER, "status": {"goal_id": GOAL_ID, "status": 3, "text": ""}}
+MBF_ENDED = {"dist_to_goal": 0.5, "angle_to_goal": 0.5}
+TARGET = {"target_pose": {"header": HEADER, "pose": POSE}}
 
-#: Message type: the fields of one message, what its first row holds, and its stamp.
+
+def feedback(goal_id, **fields):
+    return {"goal_id": goal_id, "feedback": fields}
+
+
+def event(number, request=(), response=(), kind=1):
+    info = {"event_type": kind, "stamp": STAMP, "client_gid": (9,) * 16, "sequence_number": number}
+    return {"info": info, "request": list(request), "response": list(response)}
+
+
+def behaviour(action):
+    row = {"name": "spin", "status": "executing", "goal": "07" * 16, "source": "action"}
+    return (
+        feedback(UUID),
+        row,
+        None,
+        {"topic": "/r/spin/_action/feedback", "after": feedback(OTHER)},
+    )
+
+
+def counted(field, row, **fields):
+    now, before = (feedback(UUID, **fields, **{field: n}) for n in (2, 1))
+    return now, row, None if "source" not in row else T, {"after": before}
+
+
+def sent(action):
+    row = {"name": "spin", "status": "pending", "goal": "07" * 16, "source": "action"}
+    topic = "/spin/_action/send_goal/_service_event"
+    request = event(1, [{"goal_id": UUID}])
+    return request, row, T, {"topic": topic, "after": event(2, [{"goal_id": OTHER}])}
+
+
+def cleared(service):
+    row = {"name": "clear_all", "status": "running", "source": "service"}
+    extra = {"topic": "/costmap/clear_all/_service_event", "after": event(2)}
+    return event(1), row, T, extra
+
+
+#: Message type: the fields of one message, what its first row holds, and its stamp; where it takes
+#: more than one message of any topic to make a row, also the topic and the message before.
 DECODER_LINES = {
     "nav_msgs/msg/Odometry": (
         {
@@ -124,15 +171,6 @@ DECODER_LINES = {
     "geometry_msgs/msg/PoseStamped": (
         {"header": HEADER, "pose": POSE},
         {**PLACED, "covariance": [np.nan] * 36},
-        T,
-    ),
-    "nav2_msgs/srv/SetInitialPose_Event": (
-        {
-            "info": {"event_type": 1, "stamp": STAMP},
-            "request": [{"pose": {"header": HEADER, "pose": POSED}}],
-            "response": [],
-        },
-        {**PLACED, "covariance": COV36},
         T,
     ),
     "geometry_msgs/msg/PoseArray": (
@@ -397,6 +435,132 @@ DECODER_LINES = {
         T,
     ),
     "rosgraph_msgs/msg/Clock": ({"clock": STAMP}, {"clock_ns": T}, None),
+    "action_msgs/msg/GoalStatusArray": (
+        {"status_list": [GOAL]},
+        {"name": "spin", "status": "aborted", "goal": "07" * 16, "source": "action"},
+        None,
+        {"topic": "/spin/_action/status", "after": NO_GOALS},
+    ),
+    "actionlib_msgs/msg/GoalStatusArray": (
+        {"header": HEADER, "status_list": [{"goal_id": GOAL_ID, "status": 4, "text": ""}]},
+        {"name": "move_base", "status": "aborted", "goal": "g", "source": "action"},
+        T,
+        {"topic": "/move_base/status", "after": {"header": HEADER, **NO_GOALS}},
+    ),
+    **{
+        f"nav2_msgs/action/{action}_FeedbackMessage": behaviour(action)
+        for action in ("Spin", "BackUp", "Wait", "DriveOnHeading", "AssistedTeleop")
+    },
+    **{
+        f"nav2_msgs/action/{action}_FeedbackMessage": counted(
+            "number_of_recoveries",
+            {"name": "recovery 2", "source": "navigation_feedback"},
+            **PROGRESS,
+        )
+        for action in ("NavigateToPose", "NavigateThroughPoses")
+    },
+    **{
+        f"{package}/action/DockRobot_FeedbackMessage": counted(
+            "num_retries", {"name": "docking retry 2"}
+        )
+        for package in ("nav2_msgs", "opennav_docking_msgs")
+    },
+    **{
+        f"nav2_msgs/action/{action}_SendGoal_Event": sent(action)
+        for action in (
+            "Spin",
+            "BackUp",
+            "Wait",
+            "DriveOnHeading",
+            "AssistedTeleop",
+            "NavigateToPose",
+            "NavigateThroughPoses",
+        )
+    },
+    **{
+        f"nav2_msgs/srv/{service}_Event": cleared(service)
+        for service in (
+            "ClearEntireCostmap",
+            "ClearCostmapAroundRobot",
+            "ClearCostmapExceptRegion",
+            "ClearCostmapAroundPose",
+        )
+    },
+    "std_srvs/srv/Empty_Event": (
+        event(1),
+        {"name": "reinitialize_global_localization", "status": "running", "source": "service"},
+        T,
+        {"topic": "/reinitialize_global_localization/_service_event", "after": event(2)},
+    ),
+    "nav2_msgs/srv/SetInitialPose_Event": (
+        event(1, [{"pose": {"header": HEADER, "pose": POSED}}]),
+        {"position_xyz": [1, 2, 3], "orientation_xyzw": [0, 0, 0.6, 0.8], "covariance": COV36},
+        T,
+        {"after": event(2)},
+    ),
+    "move_base_msgs/msg/MoveBaseActionGoal": (
+        {"header": HEADER, "goal_id": GOAL_ID, "goal": TARGET},
+        {"name": "move_base", "status": "pending", "goal": "g"},
+        T,
+    ),
+    "move_base_msgs/msg/MoveBaseActionFeedback": (
+        {**ENDED, "feedback": {"base_position": {"header": HEADER, "pose": POSE}}},
+        {"name": "move_base", "status": "active", "goal": "g"},
+        T,
+        {"after": {"header": HEADER, "status": {"goal_id": {"stamp": STAMP, "id": "f"}}}},
+    ),
+    "move_base_msgs/msg/MoveBaseActionResult": (
+        {**ENDED, "result": {}},
+        {"name": "move_base", "status": "succeeded", "goal": "g"},
+        T,
+    ),
+    "mbf_msgs/msg/MoveBaseActionGoal": (
+        {"header": HEADER, "goal_id": GOAL_ID, "goal": TARGET},
+        {"name": "move_base", "status": "pending", "goal": "g"},
+        T,
+    ),
+    "mbf_msgs/msg/MoveBaseActionResult": (
+        {**ENDED, "result": {"outcome": 15, "message": "blocked", **MBF_ENDED}},
+        {"name": "move_base", "status": "aborted", "goal": "g"},
+        T,
+    ),
+    "mbf_msgs/msg/RecoveryActionGoal": (
+        {
+            "header": HEADER,
+            "goal_id": GOAL_ID,
+            "goal": {"behavior": "rotate", "concurrency_slot": 0},
+        },
+        {"name": "rotate", "status": "pending", "goal": "g", "source": "action"},
+        T,
+    ),
+    "mbf_msgs/msg/RecoveryActionResult": (
+        {**ENDED, "result": {"outcome": 151, "message": "", "used_plugin": "rotate"}},
+        {"name": "rotate", "status": "canceled", "goal": "g"},
+        T,
+    ),
+    "mbf_msgs/msg/ExePathActionResult": (
+        {**ENDED, "result": {"outcome": 106, "message": "stuck", **MBF_ENDED}},
+        {"level": 106, "name": "exe_path", "message": "outcome 106: stuck"},
+        T,
+    ),
+    "nav2_msgs/msg/CollisionMonitorState": (
+        {"action_type": 1, "polygon_name": "front"},
+        {"level": 1, "message": "collision monitor: stop by polygon front"},
+        None,
+        {"after": {"action_type": 0, "polygon_name": ""}},
+    ),
+    "nav2_msgs/msg/CollisionDetectorState": (
+        {"polygons": ["front", "rear"], "detections": [False, True]},
+        {"level": 1, "message": "collision detector: points in rear"},
+        None,
+        {"after": {"polygons": ["front", "rear"], "detections": [False, False]}},
+    ),
+    "nav2_msgs/msg/SpeedLimit": (
+        {"header": HEADER, "percentage": True, "speed_limit": 50.0},
+        {"name": "speed_limit", "message": "speed limit: 50 %"},
+        T,
+        {"after": {"header": HEADER, "percentage": True, "speed_limit": 0.0}},
+    ),
     "rcl_interfaces/msg/Log": ({"stamp": STAMP, **LOG}, {"level": 4, "message": "text"}, T),
     "rosgraph_msgs/msg/Log": ({"header": HEADER, **LOG}, {"level": 4, "message": "text"}, T),
     "foxglove_msgs/msg/PoseInFrame": (
@@ -483,9 +647,9 @@ def test_perturbation(name):
 
 @pytest.mark.parametrize("name", DECODER_LINES)
 def test_decoder(name):
-    message, row, stamp = DECODER_LINES[name]
+    message, row, stamp, *more = DECODER_LINES[name]
     stamped = {} if stamp is None else {"t_sensor_ns": stamp}
-    check_decoder(DECODERS.load(name), message, row, **stamped)
+    check_decoder(DECODERS.load(name), message, row, **stamped, **(more[0] if more else {}))
 
 
 def test_every_registered_name_has_its_line():

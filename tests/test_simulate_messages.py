@@ -21,7 +21,7 @@ def test_every_layout_is_complete(name, definitions):
 
     for msgtype in definitions:
         text, digest = store.generate_msgdef(msgtype)
-        assert text
+        assert text or not definitions[msgtype]
         assert digest
 
 

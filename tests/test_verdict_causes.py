@@ -61,6 +61,7 @@ def recovering(t_s, name="Spin", status="running"):
         t_s,
         name=[name] * len(t_s),
         status=[status] * len(t_s),
+        goal=[""] * len(t_s),
         source=["behavior_tree"] * len(t_s),
     )
 

@@ -207,7 +207,8 @@ FINDINGS: dict[str, Explanation] = {
     "SR-ACT-005": Explanation(
         "A needless recovery",
         "Did the robot recover although it was right about where it was and the map was right?",
-        "Recoveries begun in a healthy interval with the belief within half of the lost limit.",
+        "Recorded recoveries begun in a healthy interval with the belief within half of the lost "
+        "limit; those that are only inferred from motion do not count.",
         "Somebody may have stood in the way: people are no change of the map.",
     ),
     "SR-DAT-001": Explanation(

@@ -238,10 +238,16 @@ _SCHEMAS = (
     ),
     _table(
         "recoveries",
-        "recovery actions and behaviour-tree changes that mark them",
-        Column("name", "str", doc="behaviour as the log names it"),
-        Column("status", "str", doc="running, success, failure or idle"),
-        Column("source", "str", doc="behavior_tree, recovery_status, or inferred"),
+        "recovery actions, and the navigation goals around them",
+        Column("name", "str", doc="behaviour, action or service as the log names it"),
+        Column("status", "str", doc="as the source names it, in lower case"),
+        Column("goal", "str", doc="id of the goal or call, where the source tells it; else empty"),
+        Column(
+            "source",
+            "str",
+            doc="behavior_tree, action, navigation_feedback, service, recovery_status, log, or "
+            "inferred (from motion or costmaps: nobody said so)",
+        ),
     ),
     _table(
         "references",
@@ -286,7 +292,8 @@ _SCHEMAS = (
     ),
     _table(
         "health",
-        "diagnostics, log lines, parameters, states of nodes and batteries",
+        "diagnostics, log lines, parameters, states of nodes and batteries, what safety devices "
+        "did",
         Column("level", "int32", doc="as the message type counts; 20, info, where it has none"),
         Column("name", "str", doc="who says it"),
         Column("message", "str", doc="what was said"),

@@ -13,6 +13,10 @@ from __future__ import annotations
 from slamreplay.registry import Registry
 
 _HERE = "slamreplay.ingest.decoders"
+_BEHAVIOURS = ("Spin", "BackUp", "Wait", "DriveOnHeading", "AssistedTeleop")
+_NAVIGATIONS = ("NavigateToPose", "NavigateThroughPoses")
+_CLEARINGS = ("ClearEntireCostmap", "ClearCostmapAroundRobot", "ClearCostmapExceptRegion",
+              "ClearCostmapAroundPose")  # fmt: skip
 
 #: Message type to its decoder; other packages add theirs as entry points `slamreplay.decoders`.
 DECODERS = Registry(
@@ -28,7 +32,6 @@ DECODERS = Registry(
         "sensor_msgs/msg/PointCloud2": f"{_HERE}.point_cloud:POINT_CLOUD",
         "geometry_msgs/msg/PoseWithCovarianceStamped": f"{_HERE}.pose:POSE_WITH_COVARIANCE",
         "geometry_msgs/msg/PoseStamped": f"{_HERE}.pose:POSE",
-        "nav2_msgs/srv/SetInitialPose_Event": f"{_HERE}.set_initial_pose:SET_INITIAL_POSE",
         "geometry_msgs/msg/PoseArray": f"{_HERE}.particles:POSE_ARRAY",
         "nav2_msgs/msg/ParticleCloud": f"{_HERE}.particles:PARTICLE_CLOUD",
         "tf2_msgs/msg/TFMessage": f"{_HERE}.transforms:TRANSFORMS",
@@ -62,6 +65,41 @@ DECODERS = Registry(
         "cartographer_ros_msgs/msg/LandmarkList": f"{_HERE}.tags:LANDMARKS",
         "sensor_msgs/msg/NavSatFix": f"{_HERE}.nav_sat_fix:NAV_SAT_FIX",
         "move_base_msgs/msg/RecoveryStatus": f"{_HERE}.recovery_status:RECOVERY_STATUS",
+        "nav2_msgs/msg/CollisionMonitorState": f"{_HERE}.safety_state:COLLISION_MONITOR",
+        "nav2_msgs/msg/CollisionDetectorState": f"{_HERE}.safety_state:COLLISION_DETECTOR",
+        "nav2_msgs/msg/SpeedLimit": f"{_HERE}.safety_state:SPEED_LIMIT",
+        "action_msgs/msg/GoalStatusArray": f"{_HERE}.goal_status:GOAL_STATUS",
+        "actionlib_msgs/msg/GoalStatusArray": f"{_HERE}.goal_status:GOAL_STATUS_ROS1",
+        **{
+            f"nav2_msgs/action/{action}_FeedbackMessage": f"{_HERE}.action_feedback:BEHAVIOUR"
+            for action in _BEHAVIOURS
+        },
+        **{
+            f"nav2_msgs/action/{action}_FeedbackMessage": f"{_HERE}.action_feedback:NAVIGATION"
+            for action in _NAVIGATIONS
+        },
+        **{
+            f"{package}/action/DockRobot_FeedbackMessage": f"{_HERE}.action_feedback:DOCKING"
+            for package in ("nav2_msgs", "opennav_docking_msgs")
+        },
+        **{
+            f"nav2_msgs/action/{action}_SendGoal_Event": f"{_HERE}.service_event:GOAL_SENT"
+            for action in (*_BEHAVIOURS, *_NAVIGATIONS)
+        },
+        **{
+            f"nav2_msgs/srv/{service}_Event": f"{_HERE}.service_event:CLEARING"
+            for service in _CLEARINGS
+        },
+        "std_srvs/srv/Empty_Event": f"{_HERE}.service_event:EMPTY",
+        "nav2_msgs/srv/SetInitialPose_Event": f"{_HERE}.service_event:INITIAL_POSE",
+        "move_base_msgs/msg/MoveBaseActionGoal": f"{_HERE}.move_base:GOAL",
+        "move_base_msgs/msg/MoveBaseActionFeedback": f"{_HERE}.move_base:FEEDBACK",
+        "move_base_msgs/msg/MoveBaseActionResult": f"{_HERE}.move_base:RESULT",
+        "mbf_msgs/msg/MoveBaseActionGoal": f"{_HERE}.move_base:GOAL",
+        "mbf_msgs/msg/MoveBaseActionResult": f"{_HERE}.move_base:RESULT",
+        "mbf_msgs/msg/ExePathActionResult": f"{_HERE}.move_base:PATH_RESULT",
+        "mbf_msgs/msg/RecoveryActionGoal": f"{_HERE}.move_base:RECOVERY_GOAL",
+        "mbf_msgs/msg/RecoveryActionResult": f"{_HERE}.move_base:RECOVERY_RESULT",
         "diagnostic_msgs/msg/DiagnosticArray": f"{_HERE}.health:DIAGNOSTICS",
         "diagnostic_msgs/msg/DiagnosticStatus": f"{_HERE}.health:DIAGNOSTIC_STATUS",
         "sensor_msgs/msg/BatteryState": f"{_HERE}.battery:BATTERY_STATE",

@@ -9,11 +9,13 @@ from slamreplay.bundle.manifest import FrameEdge, Frames, Loss
 from slamreplay.bundle.view import ROLE_TABLES
 from slamreplay.errors import UsageError
 from slamreplay.ingest import roles
+from slamreplay.ingest.changes import settle_changes
 from slamreplay.ingest.dead_reckoning import dead_reckoned, is_carried, objection
 from slamreplay.ingest.doubles import without_doubles
 from slamreplay.ingest.frames import direct_pose, find_frames, settle, without_frame
 from slamreplay.ingest.lasers import second_scan
 from slamreplay.ingest.leaks import repeated_reference
+from slamreplay.ingest.log_lines import told_in_logs
 from slamreplay.ingest.names import SCORES, is_map_frame, is_reference, tokens
 from slamreplay.ingest.roles import Choice
 from slamreplay.ingest.rows import TopicRows
@@ -49,7 +51,9 @@ def settle_cast(topics: Sequence[TopicRows], overrides: Mapping[str, str]) -> Ca
         UsageError: a topic's type cannot play the role it was given.
     """
     tf_rows, tree, losses = settle([t for t in topics if t.table == "transforms"])
-    others = [t for t in topics if t.table != "transforms"]
+    others, ended = settle_changes([t for t in topics if t.table != "transforms"])
+    others += told_in_logs(others)
+    losses = [*losses, *ended]
     free = _not_given(others, overrides)
     given = {r: _given(r, n, [*others, *tf_rows]) for r, n in overrides.items() if r in ROLE_TABLES}
     found: dict[str, Choice | None] = {

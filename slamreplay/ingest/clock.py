@@ -99,11 +99,29 @@ def row_times(topic: TopicRows, clock: Clock) -> tuple[Times, list[Loss]]:
 
 
 #: What has no header: a log time is all it ever had.
-_UNSTAMPED = frozenset({"geometry_msgs/msg/Twist", "ackermann_msgs/msg/AckermannDrive",
-                        "std_msgs/msg/Float32", "std_msgs/msg/Float64", "map_server",
-                        "diagnostic_msgs/msg/DiagnosticStatus", "dynamic_reconfigure/msg/Config",
-                        "lifecycle_msgs/msg/TransitionEvent",
-                        "rosgraph_msgs/msg/Clock"})  # fmt: skip
+_UNSTAMPED = frozenset(
+    {
+        "geometry_msgs/msg/Twist",
+        "map_server",
+        "ackermann_msgs/msg/AckermannDrive",
+        "std_msgs/msg/Float32",
+        "std_msgs/msg/Float64",
+        "diagnostic_msgs/msg/DiagnosticStatus",
+        "dynamic_reconfigure/msg/Config",
+        "lifecycle_msgs/msg/TransitionEvent",
+        "rosgraph_msgs/msg/Clock",
+        "action_msgs/msg/GoalStatusArray",
+        "nav2_msgs/msg/CollisionMonitorState",
+        "nav2_msgs/msg/CollisionDetectorState",
+        "nav2_msgs/action/Spin_FeedbackMessage",
+        "nav2_msgs/action/BackUp_FeedbackMessage",
+        "nav2_msgs/action/Wait_FeedbackMessage",
+        "nav2_msgs/action/DriveOnHeading_FeedbackMessage",
+        "nav2_msgs/action/AssistedTeleop_FeedbackMessage",
+        "nav2_msgs/action/DockRobot_FeedbackMessage",
+        "opennav_docking_msgs/action/DockRobot_FeedbackMessage",
+    }
+)
 #: Types of logs that one process wrote line by line as messages came, each topic from one
 #: publisher: of two rows the later one is the later one, whatever the stamps say.
 _IN_ORDER = ("carmen/", "mrclam/")

@@ -89,7 +89,8 @@ def _no_use(
 
 def _in_its_table(topic: TopicRows, cast: Cast, table_of: Mapping[str, str]) -> TopicRows:
     table = table_of.get(topic.topic, topic.table)
-    if topic.table in ("transforms", "references"):  # tags on tf share their topic's name with it
+    # Tags on tf, and recoveries told of in log lines, share their topic's name with it.
+    if topic.table in ("transforms", "references", "health", "recoveries"):
         return topic
     if {topic.table, table} == {"odometry", "velocities"}:  # so does odometry made of velocities
         return topic

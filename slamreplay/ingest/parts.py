@@ -38,8 +38,8 @@ _WITHOUT = {
         "what the planner saw, and the clearance of its actions, cannot be judged",
     ),
     "recovery": (
-        "no behaviour-tree log, no recovery status",
-        "recoveries can only be inferred from motion",
+        "no behaviour-tree log, no recovery's action, service event, status or log line",
+        "recoveries can only be inferred from motion and costmaps",
     ),
 }
 

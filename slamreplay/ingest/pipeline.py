@@ -14,8 +14,10 @@ from slamreplay.bundle.view import Bundle
 from slamreplay.ingest.assembly import Assembly
 from slamreplay.ingest.cast import settle_cast
 from slamreplay.ingest.clock import choose_clock, row_times
+from slamreplay.ingest.inferred import with_inferred
 from slamreplay.ingest.lasers import no_returns
 from slamreplay.ingest.layers import lay_out
+from slamreplay.ingest.log_lines import is_told_in_log
 from slamreplay.ingest.meaning import without_meaning
 from slamreplay.ingest.options import IngestOptions
 from slamreplay.ingest.overrides import check_topics, read_overrides
@@ -81,7 +83,7 @@ def _ingest(
     for topic in layers.topics:
         t_ns, remarks = row_times(topic, clock)
         timed.append((topic, t_ns))
-        losses += remarks
+        losses += [] if is_told_in_log(topic) else remarks  # its lines are told of already
     if options.reference is not None:
         rows, source, remarks = _survey(options.reference, cast.frames)
         timed.append((rows, rows.t_sensor_ns))
@@ -108,7 +110,7 @@ def _ingest(
         losses=_sorted(losses),
         tables={},
     )
-    write_bundle(target, manifest, tables, layers.grids)
+    write_bundle(target, manifest, with_inferred(manifest, tables), layers.grids)
     return Bundle.open(target)
 
 

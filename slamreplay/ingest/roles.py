@@ -9,7 +9,9 @@ import numpy as np
 
 from slamreplay.bundle.manifest import Frames
 from slamreplay.bundle.no_return import told_as_range_max
+from slamreplay.bundle.recoveries import NAVIGATIONS, tells_of_every_recovery
 from slamreplay.bundle.schema import JUDGING_KINDS
+from slamreplay.ingest.action_names import action_of, is_recovery, service_of
 from slamreplay.ingest.names import (
     basename,
     is_commanded,
@@ -179,9 +181,26 @@ def _by_name(*preferred: str) -> Rank:
 
 
 def choose_recovery(topics: Sequence[TopicRows]) -> Choice | None:
-    """Where recoveries would be told of; none having happened is an answer too."""
-    found = [t for t in topics if t.table == "recoveries"]
-    return _pick(found, lambda t: (len(t), t.messages), "recovery actions", "most of them")
+    """Where recoveries are told of; that none happened is an answer too, but for log lines."""
+    found = [t for t in topics if t.table == "recoveries" and _tells_of_recoveries(t)]
+
+    def rank(t: TopicRows) -> tuple[object, ...]:
+        return (not t.type.endswith("/Log"), tells_of_every_recovery(t.type), len(t), t.messages)
+
+    order = "a navigator before single actions and log lines, then most of them"
+    return _pick(found, rank, "recovery actions", order)
+
+
+def _tells_of_recoveries(topic: TopicRows) -> bool:
+    """Whether recoveries would be in this topic: not where it tells of goals or docking alone."""
+    action = action_of(topic.topic)
+    if topic.type.endswith("/Log"):
+        return bool((~np.isin(topic.columns["name"].astype(str), sorted(NAVIGATIONS))).any())
+    if topic.type.endswith(("/GoalStatusArray", "_SendGoal_Event")):
+        return is_recovery(action)
+    if topic.type == "std_srvs/srv/Empty_Event":
+        return is_recovery(service_of(topic.topic))
+    return "/MoveBaseAction" not in topic.type and "/DockRobot_" not in topic.type
 
 
 def choose_initial_pose(topics: Sequence[TopicRows]) -> Choice | None:

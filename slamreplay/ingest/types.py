@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any
 from slamreplay.errors import LogError
 from slamreplay.ingest.readers.reader import Connection
 from slamreplay.ingest.wire.layout import Struct, UnknownLayoutError, layout_of
-from slamreplay.messages.definitions import DEFINITIONS, LATER_DEFINITIONS
-from slamreplay.messages.services import as_message, event_definition
+from slamreplay.messages.definitions import DEFINITIONS
+from slamreplay.messages.interfaces import message_definition
+from slamreplay.messages.layouts import layouts as shipped_layouts
 
 if TYPE_CHECKING:
     from rosbags.interfaces.typing import Typesdict
@@ -20,38 +21,37 @@ _DURATION = "builtin_interfaces/msg/Duration"
 
 
 def layouts(connection: Connection) -> list[Struct]:
-    """What a connection's messages may look like on the wire, the likeliest first.
+    """What a connection's messages may look like on the wire, in the order to try them.
 
     The log's own definition wins, and is read apart from all others, so that two layouts of one
     type in one log do not meet. Without one, ROS 2's types and `slamreplay.messages` are used, in
-    every layout that a type has had.
+    every layout that a type has had, the newest first.
 
     Raises:
         LogError: the type has no (readable) definition.
     """
-    name, encoding = as_message(connection.type), connection.encoding
-    text = event_definition(connection.type, connection.definition)
+    name, encoding = connection.type, connection.encoding
+    own = message_definition(name, connection.definition)
+    form = connection.definition_format
     try:
-        if text:
-            own = _own(encoding, name, connection.definition_format, text)
-            return [layout_of(name, own)]
-        found = [
-            layout_of(name, _with_needed({}, name, encoding, later=later))
-            for later in (False, True)
-            if _shipped(name, encoding, later=later) is not None
-        ]
+        if own:
+            return [layout_of(name, _own(encoding, name, form, own), encoding)]
+        if name in _store(encoding):
+            return [layout_of(name, _with_needed({}, name, encoding), encoding)]
+        known = [_own(encoding, name, "msg", text) for text in shipped_layouts(name)]
+        found = [layout_of(name, definitions, encoding) for definitions in known]
     except UnknownLayoutError as error:
         raise LogError(f"its definition cannot be used: {error}") from error
     if not found:
         raise LogError("the log has no definition of this type, and neither do we")
-    return found if found[0] != found[-1] else found[:1]
+    return found
 
 
 def shipped(name: str, encoding: str) -> Mapping[str, Any] | None:
     """Definitions of a type and those in it that need no log, by name; None of an unknown type."""
-    if _shipped(name, encoding, later=False) is None:
+    if _shipped(name, encoding) is None:
         return None
-    return _with_needed({}, name, encoding, later=False)
+    return _with_needed({}, name, encoding)
 
 
 @cache
@@ -60,12 +60,14 @@ def _own(encoding: str, name: str, form: str, text: str) -> Mapping[str, Any]:
 
     try:
         found = get_types_from_idl(text) if form == "idl" else get_types_from_msg(text, name)
+        if "/srv/" in name:  # rosbags knows no names of this form
+            found = {name: found.pop(next(iter(found))), **found}
     except Exception as error:  # a parser of foreign text fails in many ways
         raise LogError(f"its definition cannot be read: {str(error).splitlines()[0]}") from error
-    return _with_needed(found, name, encoding, later=False)
+    return _with_needed(found, name, encoding)
 
 
-def _with_needed(found: Typesdict, name: str, encoding: str, *, later: bool) -> Mapping[str, Any]:
+def _with_needed(found: Typesdict, name: str, encoding: str) -> Mapping[str, Any]:
     """Definitions with those that fields of theirs need and that are not among them.
 
     Recorders leave out builtin_interfaces, and odd bags even std_msgs/Header.
@@ -74,7 +76,7 @@ def _with_needed(found: Typesdict, name: str, encoding: str, *, later: bool) -> 
     needed = {name, *_needed(whole)}
     while missing := sorted(needed - set(whole)):
         for kind in missing:
-            shipped = _shipped(kind, encoding, later=later)
+            shipped = _shipped(kind, encoding)
             if shipped is None:
                 raise UnknownLayoutError(f"{kind} is not defined")
             whole[kind] = shipped
@@ -83,7 +85,7 @@ def _with_needed(found: Typesdict, name: str, encoding: str, *, later: bool) -> 
 
 
 @cache
-def _shipped(name: str, encoding: str, *, later: bool) -> Any:
+def _shipped(name: str, encoding: str) -> Any:
     """(constants, fields) of a type that rosbags or `slamreplay.messages` knows, or None."""
     from rosbags.interfaces import Nodetype
     from rosbags.typesys import get_types_from_msg
@@ -95,8 +97,8 @@ def _shipped(name: str, encoding: str, *, later: bool) -> Any:
         return [], [(field, (Nodetype.BASE, (kind, 0))) for field, kind in fields]
     if (known := _store(encoding).get(name)) is not None:
         return known
-    texts = DEFINITIONS | LATER_DEFINITIONS if later else DEFINITIONS
-    return get_types_from_msg(texts[name], name)[name] if name in texts else None
+    text = DEFINITIONS.get(name)
+    return None if text is None else get_types_from_msg(text, name)[name]
 
 
 @cache

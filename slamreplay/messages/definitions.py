@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from slamreplay.messages.drives import DRIVES
 from slamreplay.messages.foxglove import FOXGLOVE_DEFINITIONS
-from slamreplay.messages.services import SERVICES
+from slamreplay.messages.recoveries import LATER_RECOVERIES, RECOVERIES
 from slamreplay.messages.signals import SIGNALS
 from slamreplay.messages.slam import SLAM
 from slamreplay.messages.tags import TAGS
@@ -119,7 +119,7 @@ DEFINITIONS: dict[str, str] = {
     "tf2_msgs/msg/TFMessage": "geometry_msgs/TransformStamped[] transforms\n",
     **DRIVES,
     **FOXGLOVE_DEFINITIONS,
-    **SERVICES,
+    **RECOVERIES,
     **SIGNALS,
     **SLAM,
     **TAGS,
@@ -142,4 +142,5 @@ LATER_DEFINITIONS: dict[str, str] = {
         "float64 fiducial_area\n"
         "bool detected\n"
     ),
+    **LATER_RECOVERIES,
 }

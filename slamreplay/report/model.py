@@ -142,6 +142,7 @@ class ActionPart(_Strict):
     `sigma_m` is towards the nearest obstacle along its path, `clearance_m` from the footprint's
     edge, `ratio` is 3 sigma over clearance; `allowed` is null where these are not known. `error_m`
     is how far off the belief really was; `needless` of a recovery of a robot that was right.
+    `inferred` recoveries were recorded by nobody: motion or a costmap looks like one.
     """
 
     t_ns: Ns
@@ -154,6 +155,7 @@ class ActionPart(_Strict):
     error_m: Number
     needless: bool | None
     belief: BeliefPart | None
+    inferred: bool
 
 
 class FindingPart(_Strict):

@@ -102,7 +102,7 @@ def actions(post: Postmortem) -> Table:
         (
             seconds(a.t_ns - post.manifest.start_ns),
             a.kind,
-            a.name,
+            Cell(a.name, "inferred, not recorded" if a.inferred else ""),
             number(a.sigma_m, ".3f", "m"),
             number(a.clearance_m, ".2f", "m"),
             number(a.ratio),

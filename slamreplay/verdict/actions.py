@@ -16,9 +16,10 @@ from slamreplay.verdict.belief_error import BeliefError
 from slamreplay.verdict.clearance import Obstacles
 from slamreplay.verdict.contract import Contract
 from slamreplay.verdict.gate import allows, ratio, sigma_towards
+from slamreplay.verdict.goals import recoveries
 from slamreplay.verdict.judgement import Action, Interval
 from slamreplay.verdict.limits import Limits
-from slamreplay.verdict.motion import motion_starts, recoveries
+from slamreplay.verdict.motion import motion_starts
 from slamreplay.verdict.paths import Paths
 
 #: A plan this recent is what a motion follows.
@@ -49,8 +50,10 @@ def actions(
         outcome: with it each action also gets the belief's real error, recoveries whether they
             were needless.
     """
+    begun = recoveries(view)
+    inferred = {(r.t_ns, r.name) for r in begun if r.inferred}
     moments: list[tuple[int, Kind, str, str]] = [
-        (r.t_ns, "recovery", r.name, f"behaviour {r.name}") for r in recoveries(view)
+        (r.t_ns, "recovery", r.name, f"behaviour {r.name}") for r in begun
     ]
     plan, command = view.manifest.topic_of("plan"), view.manifest.topic_of("command")
     table = view.role("plan")
@@ -72,6 +75,7 @@ def actions(
         sigma, clearance = _room(t, belief, obstacles, path)
         judged = sigma is not None and clearance is not None
         error = None if outcome is None else _error(outcome.error, t)
+        is_inferred = kind == "recovery" and (t, name) in inferred
         found.append(
             Action(
                 t,
@@ -82,8 +86,9 @@ def actions(
                 ratio(sigma or 0.0, clearance or 0.0, limits.gate_sigmas) if judged else None,
                 allows(sigma or 0.0, clearance or 0.0, limits.gate_sigmas) if judged else None,
                 error,
-                _needless(t, kind, error, outcome, limits),
+                None if is_inferred else _needless(t, kind, error, outcome, limits),
                 contract.at(t, consumer),
+                is_inferred,
             )
         )
     return tuple(found)
@@ -93,8 +98,10 @@ def risky(found: tuple[Action, ...]) -> tuple[Finding, ...]:
     """What the gate has to say of the actions, one finding for each of its questions.
 
     SR-ACT-001 for all that it would have blocked, SR-ACT-004 for those that only a false
-    covariance let pass, SR-ACT-005 for recoveries of a robot that was right.
+    covariance let pass, SR-ACT-005 for recoveries of a robot that was right. Recoveries that were
+    inferred count for none: the motions they are inferred from are judged as motions.
     """
+    found = tuple(a for a in found if not a.inferred)
     blocked = [a for a in found if a.allowed is False]
     deceived = [
         a

@@ -78,7 +78,7 @@ class Contract:
 
 def contract_findings(actions: tuple[Action, ...]) -> tuple[Finding, ...]:
     """SR-ACT-003: beliefs that were acted on although something of them was missing or stale."""
-    told = [a for a in actions if a.belief is not None]
+    told = [a for a in actions if a.belief is not None and not a.inferred]
     short = [a for a in told if a.belief is not None and a.belief.lacks]
     if not short:
         return ()

@@ -133,8 +133,9 @@ class Action:
         allowed: whether 3 sigma fit into the clearance; None where that is unknown.
         error_m: how far the belief really was from hindsight then, None where unknown.
         needless: of a recovery, whether the robot was right about where it was in a map that was
-            right; None where unknown and of motions.
+            right; None where unknown, of motions, and of recoveries that are inferred.
         belief: what it was built on, None where it was not looked up.
+        inferred: whether it is a recovery that nobody recorded, inferred from motion or costmaps.
     """
 
     t_ns: int
@@ -147,6 +148,7 @@ class Action:
     error_m: float | None = None
     needless: bool | None = None
     belief: Consumed | None = None
+    inferred: bool = False
 
 
 Cause = Literal["map", "map_or_start", "lookalike"]

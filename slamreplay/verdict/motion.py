@@ -1,4 +1,4 @@
-"""When the robot moved, when it was told to, and when it began to recover."""
+"""When the robot moved, when it was told to, and what its log lines say of safety devices."""
 
 from __future__ import annotations
 
@@ -20,20 +20,13 @@ REST_M_S, REST_RAD_S = 0.05, 0.06
 STOP_NS = 2 * NS_PER_S
 #: Commands below this are zeros of a controller that is idle.
 COMMAND_M_S, COMMAND_RAD_S = 0.02, 0.05
-#: Repeated rows of one recovery within this are one recovery.
-REPEAT_NS = 2 * NS_PER_S
-#: Nav2's default trees: the node that runs as long as a goal is active, and the nodes that only
-#: choose among recoveries.
-NAVIGATION = ("NavigateRecovery",)
-WRAPPERS = ("RecoveryFallback", "RecoveryActions", "ClearingActions")
 #: What safety devices, bumpers and their drivers write into the log, and how they take it back.
 _PROTECTIVE = re.compile(
-    r"protective|emergency|e-?stop\b|safety (stop|field|zone)|bumper|cliff|collision detected",
+    r"protective|emergency|e-?stop\b|safety (stop|field|zone)|bumper|cliff|collision detected|"
+    r"collision monitor: stop",
     re.IGNORECASE,
 )
 _RELEASED = re.compile(r"releas|clear|reset|\bok\b|\binactive\b|\bnot? ", re.IGNORECASE)
-_ABORTED = ("failure", "failed", "aborted")
-_FINISHED = ("success", "succeeded", "failure", "failed", "aborted", "canceled", "idle")
 
 
 @dataclass(frozen=True)
@@ -42,14 +35,6 @@ class Span:
 
     start_ns: int
     end_ns: int
-
-
-@dataclass(frozen=True)
-class Recovery:
-    """The start of a recovery action."""
-
-    t_ns: int
-    name: str
 
 
 def moved_by(view: BundleView, otherwise: PoseTrack | None) -> PoseTrack | None:
@@ -101,60 +86,6 @@ def commanded(view: BundleView) -> tuple[NDArray[np.int64], NDArray[np.bool_]] |
     v = np.linalg.norm(np.nan_to_num(table["linear_velocity_xyz"]), axis=1)
     w = np.abs(np.nan_to_num(table["angular_velocity_xyz"][:, 2]))
     return table.t_ns, (v > COMMAND_M_S) | (w > COMMAND_RAD_S)
-
-
-def recoveries(view: BundleView) -> tuple[Recovery, ...]:
-    """Starts of recovery actions, in time order; the tree nodes around them are left out."""
-    table = view.table("recoveries")
-    if not len(table):
-        return ()
-    table = table.sorted_by_time()
-    names = table["name"].astype(str)
-    table = table.take(~np.isin(names, NAVIGATION))
-    actions = ~np.isin(table["name"].astype(str), WRAPPERS)
-    table = table.take(actions) if actions.any() else table
-    if not len(table):
-        return ()
-    status = np.char.lower(table["status"].astype(str))
-    begun = ~np.isin(status, _FINISHED)
-    table = table.take(begun) if begun.any() else table
-    found: list[Recovery] = []
-    last: dict[str, int] = {}
-    for t, name in zip(table.t_ns.tolist(), table["name"].astype(str).tolist(), strict=True):
-        if t - last.get(name, t - REPEAT_NS) >= REPEAT_NS:
-            found.append(Recovery(t, name))
-        last[name] = t
-    return tuple(found)
-
-
-def navigations(view: BundleView) -> tuple[Span, ...] | None:
-    """Times [start, end) with an active goal, as the behaviour tree tells; None where it does not.
-
-    A navigation that the log does not see the end of lasts to the log's end.
-    """
-    table = view.table("recoveries").sorted_by_time()
-    table = table.take(np.isin(table["name"].astype(str), NAVIGATION))
-    if not len(table):
-        return None
-    found, begun = [], None
-    for t, status in zip(table.t_ns.tolist(), table["status"].astype(str).tolist(), strict=True):
-        if status.lower() in _FINISHED:
-            if begun is not None:
-                found.append(Span(begun, t))
-            begun = None
-        elif begun is None:
-            begun = t
-    if begun is not None:
-        found.append(Span(begun, max(view.manifest.end_ns, begun)))
-    return tuple(found)
-
-
-def aborted(view: BundleView) -> tuple[int, ...]:
-    """Times at which a navigation ended without success."""
-    table = view.table("recoveries").sorted_by_time()
-    table = table.take(np.isin(table["name"].astype(str), NAVIGATION))
-    status = np.char.lower(table["status"].astype(str)) if len(table) else np.zeros(0, dtype=str)
-    return tuple(table.t_ns[np.isin(status, _ABORTED)].tolist())
 
 
 def protections(view: BundleView, low_ns: int, high_ns: int) -> str | None:

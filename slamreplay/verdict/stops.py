@@ -12,18 +12,9 @@ from slamreplay.bundle.view import BundleView
 from slamreplay.geometry import se2, se3
 from slamreplay.geometry.times import NS_PER_S
 from slamreplay.geometry.transforms import clean_frame
+from slamreplay.verdict.goals import aborted, navigations, recoveries
 from slamreplay.verdict.judgement import FailureMode, Interval, State, Stop
-from slamreplay.verdict.motion import (
-    STOP_NS,
-    Span,
-    aborted,
-    commanded,
-    moved_by,
-    navigations,
-    protections,
-    recoveries,
-    rests,
-)
+from slamreplay.verdict.motion import STOP_NS, Span, commanded, moved_by, protections, rests
 from slamreplay.verdict.words import BECAUSE
 
 #: A recovery this soon after the robot came to rest, or this shortly before, belongs to the stop.
@@ -92,7 +83,8 @@ def _unplanned(
 ) -> list[tuple[Span, str]]:
     """Spans before arrival with the reason to think so, in time order."""
     found: dict[int, tuple[Span, str]] = {}
-    begun = recoveries(view)
+    # What is inferred from a stop is no witness of it.
+    begun = [recovery for recovery in recoveries(view) if not recovery.inferred]
     for rest in rests(track, turning_counts=False):
         until = min(rest.end_ns, rest.start_ns + RECOVERY_AFTER_NS)
         for recovery in begun:

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from slamreplay.ingest.decoders.decoder import Decoded, Decoder, Messages
+from slamreplay.ingest.decoders.recovery_rows import recovery_columns
 
 
 def _decode(messages: Messages) -> Decoded:
-    columns = {
-        "name": messages.texts("recovery_behavior_name"),
-        "status": np.full(len(messages), "running", dtype=object),
-        "source": np.full(len(messages), "recovery_status", dtype=object),
-    }
+    name = messages.texts("recovery_behavior_name")
+    columns = recovery_columns(name, "running", "", "recovery_status", len(messages))
     return Decoded(columns, messages.every, messages.stamps("pose_stamped.header.stamp"))
 
 

@@ -23,6 +23,8 @@ _NUMBERS = {
     "float64": "f8",
 }
 _DEEPEST = 32
+#: What rosidl puts into a type without fields, which C and IDL do not know.
+_NOTHING = "structure_needs_at_least_one_member"
 
 
 class UnknownLayoutError(ValueError):
@@ -64,12 +66,15 @@ class Struct:
 Node = Number | Text | Repeated | Struct
 
 
-def layout_of(name: str, definitions: Mapping[str, Any], *, depth: int = 0) -> Struct:
+def layout_of(
+    name: str, definitions: Mapping[str, Any], encoding: str = "cdr", *, depth: int = 0
+) -> Struct:
     """The layout of a type.
 
     Args:
         name: normalised type name.
         definitions: type name to (constants, fields), as rosbags' type stores hold them.
+        encoding: "ros1", where a type without fields has no bytes, or "cdr", where it has one.
         depth: of the type in the one that was asked for.
 
     Raises:
@@ -79,16 +84,18 @@ def layout_of(name: str, definitions: Mapping[str, Any], *, depth: int = 0) -> S
         raise UnknownLayoutError(f"{name} holds itself")
     if name not in definitions:
         raise UnknownLayoutError(f"{name} is not defined")
-    fields = definitions[name][1]
-    return Struct({field: _node(spec, definitions, depth) for field, spec in fields})
+    fields = [field for field in definitions[name][1] if field[0] != _NOTHING]
+    if not fields and encoding == "cdr":
+        return Struct({_NOTHING: Number("u1")})
+    return Struct({field: _node(spec, definitions, encoding, depth) for field, spec in fields})
 
 
-def _node(spec: Any, definitions: Mapping[str, Any], depth: int) -> Node:
+def _node(spec: Any, definitions: Mapping[str, Any], encoding: str, depth: int) -> Node:
     from rosbags.interfaces import Nodetype
 
     kind, args = spec
     if kind == Nodetype.NAME:
-        return layout_of(args, definitions, depth=depth + 1)
+        return layout_of(args, definitions, encoding, depth=depth + 1)
     if kind == Nodetype.BASE:
         if args[0] == "string":
             return Text()
@@ -96,7 +103,7 @@ def _node(spec: Any, definitions: Mapping[str, Any], depth: int) -> Node:
             raise UnknownLayoutError(f"a field is a {args[0]}")
         return Number(_NUMBERS[args[0]])
     element, count = args
-    node = _node(element, definitions, depth)
+    node = _node(element, definitions, encoding, depth)
     return Repeated(node, count if kind == Nodetype.ARRAY else None)
 
 
