@@ -12,6 +12,7 @@ from tempfile import TemporaryDirectory
 from slamreplay.bundle.manifest import Loss, Source
 from slamreplay.errors import LogError
 from slamreplay.ingest.readers.reader import Connection, normalise_type
+from slamreplay.ingest.readers.sqlite.salvage import Salvaged, salvage
 
 MAGIC = b"SQLite format 3\0"
 _FORMATS = {"ros2msg": "msg", "ros2idl": "idl"}
@@ -28,6 +29,7 @@ class SqliteReader:
         self.sources = (source,)
         self.losses: list[Loss] = []
         self._path = path
+        self._salvaged: Salvaged | None = None
         try:
             with self._database() as database:
                 tables = {r[0] for r in database.execute("SELECT name FROM sqlite_master")}
@@ -45,7 +47,10 @@ class SqliteReader:
                     texts = {r[0]: (r[1], r[2]) for r in rows if r[1] in _FORMATS and r[2]}
                 counts = self._counts(database)
         except sqlite3.Error as error:
-            raise LogError(f"damaged SQLite file: {error}", where=path) from error
+            self._salvaged = salvaged = salvage(path)
+            topics, texts, counts = salvaged.topics, salvaged.definitions, dict(salvaged.counts)
+            if not topics:
+                raise LogError(f"damaged SQLite file: {error}", where=path) from error
         self._indices = {row[0]: index for index, row in enumerate(topics)}
         self.connections = tuple(
             Connection(
@@ -63,6 +68,13 @@ class SqliteReader:
     def messages(self, wanted: Collection[int]) -> Iterator[tuple[int, int, bytes]]:
         """See `Reader`."""
         self.losses.clear()
+        if self._salvaged is not None:
+            for number, t_log_ns, data in self._salvaged.messages():
+                index = self._indices.get(number)
+                if index is not None and index in wanted:
+                    yield index, t_log_ns, data
+            self.losses += self._salvaged.losses(self._path.name)
+            return
         read = 0
         try:
             with self._database() as database:
@@ -81,11 +93,8 @@ class SqliteReader:
             self.losses.append(Loss(kind="lost", what=what, count=left, reason=reason))
 
     def _counts(self, database: sqlite3.Connection) -> dict[int, int]:
-        try:
-            rows = database.execute("SELECT topic_id, COUNT(*) FROM messages GROUP BY topic_id")
-            return dict(rows.fetchall())
-        except sqlite3.Error:  # a cut file: how much is readable shows while reading
-            return {}
+        rows = database.execute("SELECT topic_id, COUNT(*) FROM messages GROUP BY topic_id")
+        return dict(rows.fetchall())
 
     @contextmanager
     def _database(self) -> Iterator[sqlite3.Connection]:
