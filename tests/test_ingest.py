@@ -611,7 +611,7 @@ def test_unwritable_output_gives_one_line(logs, robot, tmp_path):
 
 
 @pytest.mark.parametrize("name", ["log.mcap", "one.bag", "log.db3"])
-def test_a_cut_log_is_read_up_to_the_cut_or_refused_in_one_line(logs, tmp_path, name):
+def test_a_cut_log_is_read_up_to_the_cut(logs, tmp_path, name):
     ros = 1 if name.endswith(".bag") else 2
     robot = Robot(logs, ros=ros)
     scans = [("/scan", SCAN, robot.scan(s, 2000), EPOCH + s * SECOND // 10) for s in range(400)]
@@ -619,15 +619,11 @@ def test_a_cut_log_is_read_up_to_the_cut_or_refused_in_one_line(logs, tmp_path, 
     whole = path.read_bytes()
     path.write_bytes(whole[: len(whole) * 6 // 10])
 
-    if name.endswith(".db3"):
-        with pytest.raises(LogError, match="damaged SQLite file"):
-            ingest([path], tmp_path / "b")
-        return
     bundle = ingest([path], tmp_path / "b")
     assert 0 < len(bundle.table("scans")) < 400
-    (lost,) = [entry for entry in bundle.manifest.losses if entry.kind == "lost"]
-    assert "cut within a chunk" in lost.reason
-    assert lost.last_good_ns == bundle.table("scans")["t_log_ns"].max()
+    lost = [entry for entry in bundle.manifest.losses if entry.kind == "lost"]
+    assert any("cut" in entry.reason for entry in lost)
+    assert {entry.last_good_ns for entry in lost} == {bundle.table("scans")["t_log_ns"].max()}
 
 
 @pytest.mark.parametrize("name", ["log.mcap", "one.bag", "log.db3"])

@@ -6,7 +6,7 @@ import shutil
 import sqlite3
 from collections.abc import Collection, Iterator
 from contextlib import closing, contextmanager
-from itertools import accumulate
+from itertools import accumulate, islice
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -15,10 +15,13 @@ import numpy as np
 from slamreplay.bundle.manifest import Loss, Source
 from slamreplay.errors import LogError
 from slamreplay.ingest.readers.reader import WINDOW_BYTES, Block, Connection, normalise_type
+from slamreplay.ingest.readers.sqlite.salvage import Salvaged, salvage
 
 MAGIC = b"SQLite format 3\0"
 _FORMATS = {"ros2msg": "msg", "ros2idl": "idl"}
 _ROWS = 1000
+#: Number of the message, number of its topic, log time in ns, payload.
+_Row = tuple[int, int, int, bytes]
 
 
 class SqliteReader:
@@ -32,6 +35,7 @@ class SqliteReader:
         self.sources = (source,)
         self.losses: list[Loss] = []
         self._path = path
+        self._salvaged: Salvaged | None = None
         try:
             with self._database() as database:
                 tables = {r[0] for r in database.execute("SELECT name FROM sqlite_master")}
@@ -49,7 +53,10 @@ class SqliteReader:
                     texts = {r[0]: (r[1], r[2]) for r in rows if r[1] in _FORMATS and r[2]}
                 counts = self._counts(database)
         except sqlite3.Error as error:
-            raise LogError(f"damaged SQLite file: {error}", where=path) from error
+            self._salvaged = salvaged = salvage(path)
+            topics, texts, counts = salvaged.topics, salvaged.definitions, dict(salvaged.counts)
+            if not topics:
+                raise LogError(f"damaged SQLite file: {error}", where=path) from error
         self._indices = {row[0]: index for index, row in enumerate(topics)}
         self.connections = tuple(
             Connection(
@@ -68,33 +75,44 @@ class SqliteReader:
         """See `Reader`."""
         self.losses.clear()
         numbers = [number for number, index in self._indices.items() if index in wanted]
-        read: list[tuple[int, int, bytes]] = []
-        total = size = 0
-        try:
-            with self._database() as database:
-                among = ", ".join("?" * len(numbers))
-                rows = database.execute(
-                    "SELECT topic_id, timestamp, data FROM messages"  # noqa: S608 - only marks
-                    f" WHERE topic_id IN ({among}) ORDER BY id",
-                    numbers,
-                )
-                while found := rows.fetchmany(_ROWS):
-                    read += found
-                    total += len(found)
-                    size += sum(len(row[2]) for row in found)
-                    if size > WINDOW_BYTES:
-                        yield self._block(read)
-                        read, size = [], 0
-        except sqlite3.Error as error:
-            left = max(sum(self.connections[i].count for i in wanted) - total, 1)
-            reason = f"damaged SQLite file: {error}"
-            what = f"{self._path.name}: messages"
-            self.losses.append(Loss(kind="lost", what=what, count=left, reason=reason))
-        if read:
-            yield self._block(read)
+        window: list[_Row] = []
+        size = 0
+        for rows in self._rows(numbers):
+            window += rows
+            size += sum(len(row[3]) for row in rows)
+            if size > WINDOW_BYTES:
+                yield self._block(window)
+                window, size = [], 0
+        if window:
+            yield self._block(window)
 
-    def _block(self, rows: list[tuple[int, int, bytes]]) -> Block:
-        numbers, times, payloads = zip(*rows, strict=True)
+    def _rows(self, numbers: list[int]) -> Iterator[list[_Row]]:
+        """Messages of some topics, a thousand at a time; by the pages where SQLite gives up."""
+        last = None
+        salvaged = self._salvaged
+        if salvaged is None:
+            try:
+                with self._database() as database:
+                    cursor = database.execute(
+                        "SELECT id, topic_id, timestamp, data FROM messages"  # noqa: S608 - marks
+                        f" WHERE topic_id IN ({', '.join('?' * len(numbers))})"
+                        " AND typeof(timestamp) = 'integer' AND typeof(data) = 'blob' ORDER BY id",
+                        numbers,
+                    )
+                    while found := cursor.fetchmany(_ROWS):
+                        last = found[-1][0]
+                        yield found
+            except sqlite3.Error:
+                salvaged = salvage(self._path)
+            else:
+                return
+        rest = ((0, *row) for row in salvaged.messages(after=last) if row[0] in numbers)
+        while found := list(islice(rest, _ROWS)):
+            yield found
+        self.losses += salvaged.losses(self._path.name)
+
+    def _block(self, rows: list[_Row]) -> Block:
+        _, numbers, times, payloads = zip(*rows, strict=True)
         ends = np.array(list(accumulate(map(len, payloads))), dtype=np.int64)
         return Block(
             np.frombuffer(b"".join(payloads), dtype=np.uint8),
@@ -105,11 +123,8 @@ class SqliteReader:
         )
 
     def _counts(self, database: sqlite3.Connection) -> dict[int, int]:
-        try:
-            rows = database.execute("SELECT topic_id, COUNT(*) FROM messages GROUP BY topic_id")
-            return dict(rows.fetchall())
-        except sqlite3.Error:  # a cut file: how much is readable shows while reading
-            return {}
+        rows = database.execute("SELECT topic_id, COUNT(*) FROM messages GROUP BY topic_id")
+        return dict(rows.fetchall())
 
     @contextmanager
     def _database(self) -> Iterator[sqlite3.Connection]:

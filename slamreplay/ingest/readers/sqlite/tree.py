@@ -1,0 +1,146 @@
+"""Which pages a table of an SQLite file has, as far as its b-tree can still be followed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from slamreplay.ingest.readers.sqlite.btree import INTERIOR, LEAF
+from slamreplay.ingest.readers.sqlite.numbers import Bytes, Ints, Mask
+
+LOWEST, HIGHEST = (int(bound) for bound in (np.iinfo(np.int64).min, np.iinfo(np.int64).max))
+
+
+@dataclass(frozen=True, eq=False)
+class Structure:
+    """What all pages of a file say of themselves; arrays have an entry 0 that stands for none.
+
+    Attributes:
+        kinds: (P+1,) first bytes of the b-tree headers.
+        smallest, largest: (P+1,) row ids or keys on the page, without bounds where it has none.
+        damaged: (P+1,) pages that may lack cells.
+        parent, child, key: (E,) children of interior pages; see `Edges`.
+    """
+
+    kinds: Bytes
+    smallest: Ints
+    largest: Ints
+    damaged: Mask
+    parent: Ints
+    child: Ints
+    key: Ints
+
+
+@dataclass(frozen=True, eq=False)
+class Tree:
+    """Pages of one table.
+
+    Attributes:
+        pages: (P+1,) whether a page belongs to it.
+        leaves: (L,) its leaf pages.
+        ranges: (L, 2) row ids (above, up to) that belong on each leaf.
+        holes: (H, 2) row ids (above, up to) some of which are on pages that were not found.
+    """
+
+    pages: Mask
+    leaves: Ints
+    ranges: Ints
+    holes: Ints
+
+
+def no_tree(count: int) -> Tree:
+    """The tree of a table whose root is unknown, in a file of `count` pages."""
+    none = np.zeros((0, 2), dtype=np.int64)
+    return Tree(np.zeros(count + 1, dtype=bool), none[:, 0], none, np.array([[LOWEST, HIGHEST]]))
+
+
+def walk(structure: Structure, root: int) -> Tree:
+    """Follow a tree down from its root, level by level.
+
+    A child is taken when its row ids fit between the keys around it. As one key may be damaged,
+    the next one on each side is the bound; where several parents claim a page, the one whose own
+    keys fit has it. A child that is not there or fits nowhere leaves a hole.
+    """
+    pages = np.zeros(len(structure.kinds), dtype=bool)
+    leaves, holes = [], []
+    # Columns: child, low, high, and bounds that a single damaged key would not move.
+    level = np.array([[root, LOWEST, HIGHEST, LOWEST, HIGHEST]], dtype=np.int64)
+    while len(level):
+        fits = _fits(structure, level, pages)
+        holes.append(level[~fits, 3:])
+        level = level[fits]
+        pages[level[:, 0]] = True
+        is_leaf = structure.kinds[level[:, 0]] == LEAF
+        leaves.append(level[is_leaf])
+        level = level[~is_leaf]
+        holes.append(level[structure.damaged[level[:, 0]], 3:])
+        level = _children(structure, level)
+    found = np.concatenate(leaves)
+    found = found[np.argsort(found[:, 0])]
+    return Tree(pages, found[:, 0], found[:, 1:3], np.concatenate(holes))
+
+
+def _fits(structure: Structure, level: Ints, taken: Mask) -> Mask:
+    child, low, high, lower, higher = level.T
+    child = np.where((child > 0) & (child < len(taken)), child, 0)
+    kinds = structure.kinds[child]
+    smallest, largest = structure.smallest[child], structure.largest[child]
+    fits = ((kinds == INTERIOR) | (kinds == LEAF)) & ~taken[child] & (child > 0)
+    fits &= (largest > lower) & (smallest <= higher)
+    exact = (smallest > low) & (largest <= high)
+    order = np.lexsort((~exact, ~fits, child))
+    again = np.zeros(len(level), dtype=bool)
+    again[order[1:]] = child[order[1:]] == child[order[:-1]]
+    return fits & ~again
+
+
+def _children(structure: Structure, level: Ints) -> Ints:
+    """The next level: children of interior pages, with the bounds of their row ids."""
+    first = np.searchsorted(structure.parent, level[:, 0], "left")
+    counts = np.searchsorted(structure.parent, level[:, 0], "right") - first
+    of = np.repeat(np.arange(len(level)), counts)
+    within = np.arange(len(of)) - np.repeat(np.cumsum(counts) - counts, counts)
+    edge = first[of] + within
+    is_first, is_last = within == 0, within == counts[of] - 1
+    _, low, high, lower, higher = level[of].T
+    key = structure.key[edge]
+    # An edge's neighbours in these arrays are its siblings, but at the ends of a page.
+    high = np.where(is_last, high, key)
+    low = np.where(is_first, low, np.roll(high, 1))
+    lower = np.where(is_first, lower, np.minimum(low, np.roll(low, 1)))
+    higher = np.where(is_last, higher, np.maximum(high, np.roll(high, -1)))
+    return np.stack([structure.child[edge], low, high, lower, higher], axis=1)
+
+
+def merged(ranges: Ints) -> Ints:
+    """(R, 2) ranges (above, up to) of row ids, in order and without overlap."""
+    ranges = ranges[ranges[:, 0] < ranges[:, 1]]
+    if not len(ranges):
+        return ranges
+    ranges = ranges[np.argsort(ranges[:, 0], kind="stable")]
+    high = np.maximum.accumulate(ranges[:, 1])
+    first = np.concatenate([[True], ranges[1:, 0] > high[:-1]])
+    last = np.concatenate([first[1:], [True]])
+    return np.stack([ranges[first, 0], high[last]], axis=1)
+
+
+def within(ranges: Ints, ids: Ints) -> Mask:
+    """Which row ids are in one of the merged ranges."""
+    if not len(ranges):
+        return np.zeros(len(ids), dtype=bool)
+    at = np.searchsorted(ranges[:, 0], ids, "left") - 1
+    return (at >= 0) & (ids <= ranges[np.maximum(at, 0), 1])
+
+
+def absent(ranges: Ints, ids: Ints) -> Ints:
+    """How many row ids of each range are not among the sorted `ids`.
+
+    Ids are taken to begin with 1, and to end with the largest that is known.
+    """
+    lowest = min(0, int(ids[0]) - 1) if len(ids) else 0
+    highest = int(ids[-1]) if len(ids) else 0
+    low = np.maximum(ranges[:, 0], lowest)
+    high = np.where(ranges[:, 1] == HIGHEST, np.maximum(highest, low), ranges[:, 1])
+    there = np.searchsorted(ids, high, "right") - np.searchsorted(ids, low, "right")
+    return np.maximum(high - low - there, 0)
