@@ -89,7 +89,8 @@ def _no_use(
 
 def _in_its_table(topic: TopicRows, cast: Cast, table_of: Mapping[str, str]) -> TopicRows:
     table = table_of.get(topic.topic, topic.table)
-    if topic.table in ("transforms", "references"):  # tags on tf share their topic's name with it
+    # Tags on tf share their topic's name with it, scans made of a cloud share the cloud's.
+    if topic.table in ("transforms", "references", "scans", "points"):
         return topic
     if topic.topic not in table_of and topic.table == "poses" and is_sensed_dock(topic.topic):
         dock = moved(topic, "references", kind="dock")

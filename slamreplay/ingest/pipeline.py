@@ -13,6 +13,8 @@ from slamreplay.bundle.tables import Table
 from slamreplay.bundle.view import Bundle
 from slamreplay.ingest.cast import settle_cast
 from slamreplay.ingest.clock import choose_clock, row_times
+from slamreplay.ingest.clouds.second_pass import with_clouds
+from slamreplay.ingest.clouds.topics import cloud_topics
 from slamreplay.ingest.lasers import no_returns
 from slamreplay.ingest.layers import lay_out
 from slamreplay.ingest.options import IngestOptions
@@ -56,13 +58,18 @@ def ingest(
         names = [c.topic for c in connections]
         if options.robot is None and not overrides:
             refuse_mixture(connections)
-        topics, lost = read_rows(readers, topic_filter(names, options.robot), progress)
-    if options.robot is not None:
-        topics = [without_prefix(t, options.robot.strip("/")) for t in topics]
-    check_topics(overrides, sorted({t.topic for t in topics}), options.topics)
-    cast = settle_cast(topics, overrides)
+        skip = topic_filter(names, options.robot)
+        clouds = cloud_topics(connections, overrides, skip)
+        topics, lost = read_rows(readers, skip, progress, clouds.later)
+        robot = (options.robot or "").strip("/")
+        if robot:
+            topics = [without_prefix(t, robot) for t in topics]
+        roles = {r: n for r, n in overrides.items() if r != "scan" or n != clouds.forced}
+        check_topics(roles, sorted({t.topic for t in topics}), options.topics)
+        cast = settle_cast(topics, roles)
+        cast, left = with_clouds(readers, cast, clouds, overrides, robot=robot, progress=progress)
     layers = lay_out(cast, options.map)
-    losses = [*losses, *lost, *cast.losses, *layers.losses, *no_returns(cast.topics)]
+    losses = [*losses, *lost, *left, *cast.losses, *layers.losses, *no_returns(cast.topics)]
     sources += layers.sources
 
     clock = choose_clock(cast.topics)

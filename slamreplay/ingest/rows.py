@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -77,6 +77,7 @@ def read_rows(
     readers: Sequence[Reader],
     skip: Callable[[str], str | None],
     progress: Callable[[str, float], None] | None,
+    later: Collection[str] = (),
 ) -> tuple[list[TopicRows], list[Loss]]:
     """Rows of every topic with a decoder, sorted by topic and type, and everything left out.
 
@@ -84,13 +85,14 @@ def read_rows(
         readers: the log's containers.
         skip: why a topic is not wanted, None if it is.
         progress: told the share of messages read.
+        later: topics that somebody else reads.
     """
     losses: list[Loss] = []
     parts: dict[tuple[str, str], list[TopicRows]] = {}
     total = max(sum(c.count for reader in readers for c in reader.connections), 1)
     read = 0
     for reader in readers:
-        batches = _batches(reader, skip, losses)
+        batches = _batches(reader, skip, losses, later)
         for index, t_log_ns, data in reader.messages(set(batches)):
             read += 1
             if progress is not None and read % 2000 == 0:
@@ -105,10 +107,13 @@ def read_rows(
 
 
 def _batches(
-    reader: Reader, skip: Callable[[str], str | None], losses: list[Loss]
+    reader: Reader,
+    skip: Callable[[str], str | None],
+    losses: list[Loss],
+    later: Collection[str],
 ) -> dict[int, _Batch]:
     batches = {}
-    for connection in reader.connections:
+    for connection in (c for c in reader.connections if c.topic not in later):
         reason = skip(connection.topic)
         if reason is None and connection.type not in DECODERS:
             reason = "no decoder for this type"
