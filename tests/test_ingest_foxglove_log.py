@@ -198,7 +198,7 @@ def test_tables_roles_frames_and_map_are_those_of_the_ros_log(
     fox = Bundle.open(target)
 
     assert {name for name, entry in ros.manifest.tables.items() if entry.rows} == {
-        "scans", "odometry", "transforms", "poses", "particles", "plans", "points", "costmaps",
+        "scans", "odometry", "transforms", "poses", "particles", "plans", "costmaps",
         "references", "health", "map_updates",
     }  # fmt: skip
     for name, entry in ros.manifest.tables.items():

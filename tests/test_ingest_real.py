@@ -28,7 +28,7 @@ EXPECTED = {
             "scan": "/driver_laser_navigation/laser_scan", "pose": "/tf",
             "scan_2": "/driver_laser_security/laser_scan",
             "reference": "/pose_ground_truth", "command": "/cmd_vel",
-            "points": "/driver_laser_navigation/beacons_scan",
+            
         },
     ),
     "inesctec_jarvis/guardian_3.bag": (
@@ -43,7 +43,7 @@ EXPECTED = {
         {
             "odometry": "/odom", "scan": "/scan", "pose": "/tf", "map": "/map",
             "particles": "/particlecloud", "initial_pose": "/initialpose", "command": "/cmd_vel",
-            "points": "/projected_stable_scan", "clock": "/clock",
+            "clock": "/clock",
         },
     ),
     TB4: (

@@ -143,7 +143,7 @@ _SCHEMAS = (
     ),
     _table(
         "scans",
-        "planar lidar scans",
+        "planar lidar scans; of a log without any, point clouds flattened at their sensor",
         _FRAME,
         Column("angle_min_rad", "float64", unit="rad", doc="bearing of the first beam"),
         Column("angle_increment_rad", "float64", unit="rad", doc="between beams, signed"),
@@ -155,7 +155,7 @@ _SCHEMAS = (
     ),
     _table(
         "points",
-        "point clouds",
+        "point clouds the topics file asks for: the first point in each cube of 0.1 m",
         _FRAME,
         Column("points_xyz", "list_f32", unit="m", frame="frame_id", doc="x y z interleaved"),
     ),

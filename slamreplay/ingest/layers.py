@@ -89,8 +89,8 @@ def _no_use(
 
 def _in_its_table(topic: TopicRows, cast: Cast, table_of: Mapping[str, str]) -> TopicRows:
     table = table_of.get(topic.topic, topic.table)
-    # Tags on tf, and recoveries told of in log lines, share their topic's name with it.
-    if topic.table in ("transforms", "references", "health", "recoveries"):
+    # Tags on tf, recoveries told of in log lines, and scans made of a cloud share a topic's name.
+    if topic.table in ("transforms", "references", "health", "recoveries", "scans", "points"):
         return topic
     if {topic.table, table} == {"odometry", "velocities"}:  # so does odometry made of velocities
         return topic

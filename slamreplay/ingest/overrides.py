@@ -10,13 +10,14 @@ import yaml
 
 from slamreplay.bundle.view import ROLE_TABLES
 from slamreplay.errors import UsageError
+from slamreplay.ingest.clouds.band import BAND_KEY
 
 #: Frames may be named too, where neither tf nor REP-105's names say which is which.
 FRAME_KEYS = ("map_frame", "odom_frame", "base_frame")
 
 
 def read_overrides(path: Path | None) -> dict[str, str]:
-    """`role: topic` and `*_frame: frame` of a yaml, {} without one.
+    """`role: topic`, `*_frame: frame` and the height band of clouds in a yaml, {} without one.
 
     Raises:
         UsageError: the file cannot be read, or has a key that is no role.
@@ -32,19 +33,31 @@ def read_overrides(path: Path | None) -> dict[str, str]:
         return {}
     if not isinstance(given, dict):
         raise UsageError("a topics file holds lines of ROLE: TOPIC", where=path)
-    keys = [*ROLE_TABLES, *FRAME_KEYS]
+    keys = [*ROLE_TABLES, *FRAME_KEYS, BAND_KEY]
     for key, value in given.items():
         if key not in keys:
             raise UsageError(f"there is no role '{key}'", where=path, hint=_nearest(str(key), keys))
-        if not isinstance(value, str) or not value:
+        if key == BAND_KEY:
+            given = {**given, key: _band(value, path)}
+        elif not isinstance(value, str) or not value:
             raise UsageError(f"the value of '{key}' is no name", where=path)
     return {str(k): str(v) for k, v in given.items()}
+
+
+def _band(value: object, path: Path) -> str:
+    """Two heights above the floor, m, as text."""
+    numbers = value if isinstance(value, list) else []
+    if [type(n) in (int, float) for n in numbers] != [True, True] or not numbers[0] < numbers[1]:
+        raise UsageError(
+            f"'{BAND_KEY}' takes two heights above the floor", where=path, hint="as in [0.2, 1.0]"
+        )
+    return f"{numbers[0]:g} {numbers[1]:g}"
 
 
 def check_topics(overrides: Mapping[str, str], topics: Sequence[str], path: Path | None) -> None:
     """Raise UsageError where an override names a topic that the log has no usable rows of."""
     for role, topic in overrides.items():
-        if role not in FRAME_KEYS and topic not in topics:
+        if role in ROLE_TABLES and topic not in topics:
             raise UsageError(
                 f"there is no topic '{topic}' to play {role}",
                 where=path,

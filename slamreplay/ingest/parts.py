@@ -18,7 +18,7 @@ _WITHOUT = {
         "turn rates have no second witness: slip while turning is judged from scans alone",
     ),
     "scans": (
-        "no sensor_msgs/LaserScan",
+        "no sensor_msgs/LaserScan, and no cloud that a scan could be made of",
         "neither where the robot was nor whether the map changed can be judged",
     ),
     "pose": (

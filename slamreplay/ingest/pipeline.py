@@ -12,8 +12,10 @@ from slamreplay.bundle.manifest import Frames, Loss, Manifest, Role, Source
 from slamreplay.bundle.store import MANIFEST, write_bundle
 from slamreplay.bundle.view import Bundle
 from slamreplay.ingest.assembly import Assembly
-from slamreplay.ingest.cast import settle_cast
+from slamreplay.ingest.cast import Cast, settle_cast
 from slamreplay.ingest.clock import choose_clock, row_times
+from slamreplay.ingest.clouds.second_pass import with_clouds
+from slamreplay.ingest.clouds.topics import cloud_topics
 from slamreplay.ingest.inferred import with_inferred
 from slamreplay.ingest.lasers import no_returns
 from slamreplay.ingest.layers import lay_out
@@ -71,9 +73,7 @@ def _ingest(
     scratch: Path,
 ) -> Bundle:
     overrides = read_overrides(options.topics)
-    sources, topics, losses = _read(logs, options, overrides, progress, scratch)
-    check_topics(overrides, sorted({t.topic for t in topics}), options.topics)
-    cast = settle_cast(topics, overrides)
+    sources, cast, losses = _cast(logs, options, overrides, progress, scratch)
     layers = lay_out(cast, options.map)
     losses = [*losses, *cast.losses, *layers.losses, *no_returns(cast.topics)]
     sources += layers.sources
@@ -114,37 +114,55 @@ def _ingest(
     return Bundle.open(target)
 
 
-def _read(
+def _cast(
     logs: Sequence[Path],
     options: IngestOptions,
     overrides: Mapping[str, str],
     progress: Callable[[str, float], None] | None,
     scratch: Path,
-) -> tuple[list[Source], list[TopicRows], list[Loss]]:
-    """Files, rows and losses of a log of any format; of the robot that is looked at."""
+) -> tuple[list[Source], Cast, list[Loss]]:
+    """Files, settled topics and losses of a log of any format; of the robot that is looked at."""
     text = read_text_log(logs, options.robot)
     if text is not None:
-        sources, topics, losses = list(text.sources), list(text.topics), list(text.losses)
-    else:
-        with open_log(logs) as (readers, found):
-            sources = [s for reader in readers for s in reader.sources]
-            connections = [c for reader in readers for c in reader.connections]
-            if options.robot is None and not overrides:
-                refuse_mixture(connections)
-            of_robot = topic_filter(connections, options.robot)
-            of_use = without_meaning(connections, overrides.values())
-            topics, lost = read_rows(
-                readers, lambda topic: of_robot(topic) or of_use(topic), progress, scratch
-            )
-            losses = [*found, *lost]
-    if options.robot is not None:
-        topics, others = in_its_frames(topics, options.robot)
-        losses += others
-    for place, topic in enumerate(topics):  # again, for a topic is decoded in parts
-        topics[place], count = without_repeats(topic)
+        topics, losses = _of_robot(list(text.topics), options.robot)
+        check_topics(overrides, sorted({t.topic for t in topics}), options.topics)
+        return list(text.sources), settle_cast(topics, overrides), [*text.losses, *losses]
+    with open_log(logs) as (readers, damaged):
+        sources = [s for reader in readers for s in reader.sources]
+        connections = [c for reader in readers for c in reader.connections]
+        if options.robot is None and not overrides:
+            refuse_mixture(connections)
+        of_robot = topic_filter(connections, options.robot)
+        of_use = without_meaning(connections, overrides.values())
+        clouds = cloud_topics(connections, overrides, of_robot)
+        topics, lost = read_rows(
+            readers,
+            lambda topic: of_robot(topic) or of_use(topic),
+            progress,
+            scratch,
+            later=clouds.later,
+        )
+        topics, losses = _of_robot(topics, options.robot)
+        roles = {r: n for r, n in overrides.items() if r != "scan" or n != clouds.forced}
+        check_topics(roles, sorted({t.topic for t in topics}), options.topics)
+        cast, left = with_clouds(
+            readers, settle_cast(topics, roles), clouds, overrides,
+            robot=(options.robot or "").strip("/"), progress=progress,
+        )  # fmt: skip
+    return sources, cast, [*damaged, *lost, *losses, *left]
+
+
+def _of_robot(topics: Sequence[TopicRows], robot: str | None) -> tuple[list[TopicRows], list[Loss]]:
+    """Topics in the frames of the robot that is looked at, repetitions left out."""
+    found = list(topics)
+    losses: list[Loss] = []
+    if robot is not None:
+        found, losses = in_its_frames(found, robot)
+    for place, topic in enumerate(found):  # again, for a topic is decoded in parts
+        found[place], count = without_repeats(topic)
         if count:
             losses.append(Loss(kind="skipped", what=topic.topic, count=count, reason=REPEATS))
-    return sources, topics, losses
+    return found, losses
 
 
 def _survey(path: Path, frames: Frames) -> tuple[TopicRows, Source, list[Loss]]:

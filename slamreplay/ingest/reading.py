@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -21,6 +21,8 @@ def read_rows(
     skip: Callable[[str], str | None],
     progress: Callable[[str, float], None] | None,
     spill: Path | None = None,
+    *,
+    later: Collection[str] = (),
 ) -> tuple[list[TopicRows], list[Loss]]:
     """Rows of every topic with a decoder, sorted by topic and type, and everything left out.
 
@@ -30,13 +32,14 @@ def read_rows(
         progress: told the share of messages read.
         spill: an empty folder for the columns of logs that are larger than memory; without one
             everything stays in memory.
+        later: topics that somebody else reads.
     """
     losses: list[Loss] = []
     rows = Collected(spill)
     total = max(sum(c.count for reader in readers for c in reader.connections), 1)
     read = 0
     for reader in readers:
-        topics = _topics(reader, skip, losses)
+        topics = _topics(reader, skip, losses, later)
         for block in reader.blocks(set(topics)):
             order = np.argsort(block.connection, kind="stable")
             ends = np.cumsum(np.bincount(block.connection, minlength=len(reader.connections)))
@@ -54,10 +57,13 @@ def read_rows(
 
 
 def _topics(
-    reader: Reader, skip: Callable[[str], str | None], losses: list[Loss]
+    reader: Reader,
+    skip: Callable[[str], str | None],
+    losses: list[Loss],
+    later: Collection[str],
 ) -> dict[int, TopicReader]:
     topics = {}
-    for connection in reader.connections:
+    for connection in (c for c in reader.connections if c.topic not in later):
         reason = skip(connection.topic)
         if reason is None and connection.type not in DECODERS:
             reason = "no decoder for this type"

@@ -129,7 +129,7 @@ class McapReader:
         block = _by_walking(content, table)
         if len(block):
             self._damage.good(int(block.t_log_ns.max()))
-        reason = f"the file is cut within a chunk; {len(block)} messages of it could be read"
+        reason = "the file is cut within a chunk; what is whole of it is read"
         left = self._path.stat().st_size - at
         self._damage.lose("chunks", reason, at=at, size=left)
         if len(block):

@@ -99,7 +99,7 @@ class Ros1Reader:
             block, _ = _by_walking(cut_content(self._path, contents.cut), table)
             if len(block):
                 self._damage.good(int(block.t_log_ns.max()))
-            reason = f"the file is cut within a chunk; {len(block)} messages of it could be read"
+            reason = "the file is cut within a chunk; what is whole of it is read"
             left = self._path.stat().st_size - contents.cut
             self._damage.lose("chunks", reason, at=contents.cut, size=left)
             read += len(block)
