@@ -45,7 +45,8 @@ def settle_cast(topics: Sequence[TopicRows], overrides: Mapping[str, str]) -> Ca
     Raises:
         UsageError: a topic's type cannot play the role it was given.
     """
-    tf_rows, tree, losses = settle([t for t in topics if t.table == "transforms"])
+    settled = settle([t for t in topics if t.table == "transforms"])
+    tf_rows, losses = settled.topics, settled.losses
     others = [t for t in topics if t.table != "transforms"]
     free = _not_given(others, overrides)
     given = {r: _given(r, n, [*others, *tf_rows]) for r, n in overrides.items() if r in ROLE_TABLES}
@@ -71,7 +72,8 @@ def settle_cast(topics: Sequence[TopicRows], overrides: Mapping[str, str]) -> Ca
         return topic is not None
 
     odometry_rows = odometry.rows if odometry else None
-    frames = find_frames(tree, odometry_rows, map_frames, overrides, is_disguise)
+    frames = find_frames(settled.tree, odometry_rows, map_frames, overrides, is_disguise)
+    frames = frames.model_copy(update={"left_out": settled.left_out})
     for frame, topic in disguised.items():
         if frame != frames.map:
             frames, tf_rows, loss = without_frame(frame, topic, frames, tf_rows)

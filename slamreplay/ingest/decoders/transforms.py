@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from slamreplay.ingest.decoders.checks import kept, pose_rows
+from slamreplay.ingest.decoders.checks import kept, pose_rows, slashed
 from slamreplay.ingest.decoders.decoder import Decoded, Decoder, Messages, Remark
 
 
@@ -24,7 +24,8 @@ def _decode(messages: Messages) -> Decoded:
         "rotation_xyzw": rotation,
     }
     unnamed = Remark("lost", int((~named).sum()), "a frame without a name, or its own parent")
-    return kept(keep & named, columns, rows, edges.stamps(), (*remarks, unnamed))
+    slashes = slashed(edges.texts("header.frame_id"), edges.texts("child_frame_id"))
+    return kept(keep & named, columns, rows, edges.stamps(), (*remarks, unnamed, slashes))
 
 
 TRANSFORMS = Decoder("transforms", _decode)
