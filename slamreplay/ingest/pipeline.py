@@ -12,7 +12,7 @@ from slamreplay.bundle.store import MANIFEST, write_bundle
 from slamreplay.bundle.tables import Table
 from slamreplay.bundle.view import Bundle
 from slamreplay.ingest.cast import settle_cast
-from slamreplay.ingest.clock import choose_clock, row_times
+from slamreplay.ingest.clock import choose_clock
 from slamreplay.ingest.lasers import no_returns
 from slamreplay.ingest.layers import lay_out
 from slamreplay.ingest.options import IngestOptions
@@ -22,6 +22,7 @@ from slamreplay.ingest.readers.open_log import open_log
 from slamreplay.ingest.reference_file import read_reference
 from slamreplay.ingest.robots import refuse_mixture, topic_filter
 from slamreplay.ingest.roles import Choice
+from slamreplay.ingest.row_times import row_times
 from slamreplay.ingest.rows import TopicRows, read_rows
 from slamreplay.ingest.span import clock_between, cut, evidence_span
 from slamreplay.ingest.tables import build, without_prefix
