@@ -67,6 +67,7 @@ def moved_by(rows: Table, map_frame: str | None) -> Moved:
     if not len(rows):
         return Moved(np.zeros(0), 0.0, 0.0, drifts=False)
     xy, yaw = rows["position_xyz"][:, :2], se3.yaw_from_quaternion(rows["orientation_xyzw"])
+    xy = np.where(np.isfinite(xy), xy, 0.0)
     steps = np.hypot(*np.diff(xy, axis=0).T)
     way = np.append(0.0, np.cumsum(np.where(steps > 1e-4, steps, 0.0)))
     drifts = rows.schema.name == "odometry" and str(rows["frame_id"][0]) != map_frame
