@@ -31,12 +31,18 @@ class LogAudit:
 
     Args:
         view: the log; references that only judge are not in it.
-        read: gives its tables; by default those of the view, with their placeholders.
+        read: gives its tables; by default those of the view, with their placeholders. Clouds are
+            large, and then read only where no laser plays the scan's role.
     """
 
     def __init__(self, view: BundleView, read: Callable[[str], Table] | None = None) -> None:
         self.view = view
-        self.read = read or view.recorded
+        self.read = read or self._evidence
+
+    def _evidence(self, name: str) -> Table:
+        if name == "points" and self.view.manifest.topic_of("scan") is not None:
+            return Table.empty(TABLES[name])
+        return self.view.recorded(name)
 
     @cached_property
     def streams(self) -> list[Stream]:
