@@ -9,8 +9,8 @@ import yaml
 
 from slamreplay.bundle.belief import recorded_belief
 from slamreplay.bundle.format_page import format_page
+from slamreplay.consistency.inspection import inspect
 from slamreplay.errors import LogError, MapError, OutputError, SlamreplayError, UsageError
-from slamreplay.ingest.audit import inspect
 from slamreplay.ingest.options import IngestOptions
 from slamreplay.ingest.pipeline import ingest
 
@@ -323,6 +323,8 @@ def test_second_parents_and_cycles_are_left_out_with_a_reason(logs, robot, tmp_p
     lost = {k[1]: k[2] for k in losses(bundle) if k[0] == "skipped"}
     assert lost["tf camera -> base_link"] == "a second parent of base_link, odom is kept"
     assert "closes a cycle" in lost["tf laser -> map"]
+    left = {(e.parent, e.child): (e.fault, e.samples) for e in bundle.manifest.frames.left_out}
+    assert left == {("camera", "base_link"): ("second parent", 1), ("laser", "map"): ("cycle", 1)}
 
 
 def test_two_parents_that_are_all_tf_has_do_not_upset_it(logs, robot, tmp_path):

@@ -78,7 +78,10 @@ def test_odometry(random_message):
     assert row["angular_velocity_xyz"].tolist() == [w.x, w.y, w.z]
     assert (row["frame_id"], row["child_frame_id"]) == ("odom", "base_link")
     assert decoded.t_sensor_ns.tolist() == [NO_STAMP, 2_000_000_000_000_000_007, NO_STAMP]
-    assert remarks(decoded) == {("repaired", "quaternion normalised"): 3}
+    assert remarks(decoded) == {
+        ("repaired", "quaternion normalised"): 3,
+        ("repaired", "leading slash taken off frame names"): 1,
+    }
 
 
 def test_zero_quaternions_and_wild_positions_lose_their_rows(logs):
@@ -116,6 +119,20 @@ def test_imu_quantities_that_are_not_measured_are_nan(random_message):
     rate = message.angular_velocity
     assert decoded.columns["angular_velocity_xyz"][0].tolist() == [rate.x, rate.y, rate.z]
     assert decoded.columns["linear_acceleration_covariance"][0, 0] == 4.0
+
+
+@pytest.mark.parametrize(("angle_max", "odd"), [(0.75, 0), (1.0, 0), (0.0, 0), (2.5, 1), (-2, 1)])
+def test_a_last_beam_that_is_elsewhere_is_remarked_upon(logs, angle_max, odd):
+    kind = "sensor_msgs/msg/LaserScan"
+    scan = logs.make(
+        kind, angle_min=-1.0, angle_max=angle_max, angle_increment=0.25, range_max=9.0,
+        ranges=np.ones(8, np.float32),
+    )  # fmt: skip
+
+    decoded = decode(kind, scan)
+
+    assert decoded.columns["angle_increment_rad"].tolist() == [0.25]  # beams are where these say
+    assert sum(remarks(decoded).values()) == odd
 
 
 def test_laser_ranges_stay_as_recorded(logs):
@@ -189,7 +206,10 @@ def test_transforms(logs, kind):
     assert decoded.t_sensor_ns.tolist() == [3_000_000_000]
     assert decoded.columns["translation_xyz"][0, 0] == 0.5
     np.testing.assert_allclose(yaw_from_quaternion(decoded.columns["rotation_xyzw"]), [1.0])
-    assert remarks(decoded) == {("lost", "a frame without a name, or its own parent"): 2}
+    assert remarks(decoded) == {
+        ("lost", "a frame without a name, or its own parent"): 2,
+        ("repaired", "leading slash taken off frame names"): 1,
+    }
 
 
 def test_occupancy_grid_and_costmap(logs):

@@ -10,8 +10,8 @@ from typer.testing import CliRunner
 
 from slamreplay.bundle.view import Bundle
 from slamreplay.cli import ingest as ingest_command
+from slamreplay.consistency.inspection import inspect
 from slamreplay.errors import UsageError
-from slamreplay.ingest.audit import inspect
 from slamreplay.ingest.options import IngestOptions
 from slamreplay.ingest.pipeline import ingest
 from slamreplay.testing.synthetic import room_grid, synthetic_bundle
@@ -210,7 +210,6 @@ def test_tables_roles_frames_and_map_are_those_of_the_ros_log(
     assert {r.role: r.topic for r in fox.manifest.roles} == {
         "scan": "/scan", "odometry": "/odom", "pose": "/tf", "map": "/map",
         "costmap": "/local_costmap", "particles": "/particle_cloud", "plan": "/plan",
-        "points": "/points",
     }  # fmt: skip
     assert [(r.role, r.topic, r.messages) for r in fox.manifest.roles] == [
         (r.role, r.topic, r.messages) for r in ros.manifest.roles

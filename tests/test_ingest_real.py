@@ -28,7 +28,7 @@ EXPECTED = {
             "scan": "/driver_laser_navigation/laser_scan", "pose": "/tf",
             "scan_2": "/driver_laser_security/laser_scan",
             "reference": "/pose_ground_truth", "command": "/cmd_vel",
-            
+
         },
     ),
     "inesctec_jarvis/guardian_3.bag": (

@@ -147,8 +147,10 @@ FINDINGS: dict[str, Explanation] = {
     "SR-CLK-001": Explanation(
         "Clocks disagree",
         "Do header stamps and log times tell the same story?",
-        "Median offset of log time minus header stamp, and its drift over the log.",
-        "Simulated time is meant to differ; replayed bags carry the old stamps.",
+        "Median offset of log time minus header stamp; its drift is the Theil-Sen slope of the "
+        "least delays of 30 windows, for a delay can only grow, with jumps taken out.",
+        "Simulated time is meant to differ; replayed bags carry the old stamps. Another computer's "
+        "clock and a long way to the recorder look the same.",
     ),
     "SR-CLK-002": Explanation(
         "Scans and odometry do not share a clock",
@@ -158,6 +160,95 @@ FINDINGS: dict[str, Explanation] = {
         "or the odometry topic where tf was compared, says which of the two is late.",
         "Fewer than two turns tell nothing. Steady turning alone tells a delay from a scale error "
         "badly; the sigma says so. Deskewing by a wrong time_increment adds half a sweep.",
+    ),
+    "SR-CLK-003": Explanation(
+        "A clock jumped",
+        "Did stamps move against the log time at one message, and stay there?",
+        "A step of the delay beyond 8 times the usual one and 30 ms that brings most of a change "
+        "of its level (low delays of 3 s before and after); a raised level must last 30 s, or "
+        "the recorder only stalled.",
+        "Simulated time that was paused looks the same; so does a driver restarted with another "
+        "latency.",
+    ),
+    "SR-CLK-004": Explanation(
+        "Topics are on different clocks",
+        "Do all sensors, transforms and poses carry stamps of one clock?",
+        "Median of stamp minus log time carried over to the bundle's clock: more than 1 s for "
+        "sensors, 15 s for transforms and poses, which a localizer may date ahead. What lies off "
+        "by more than 5 s (15 s) is placed by its log time.",
+        "A sensor that is really late by a second cannot be told from one whose clock is; where "
+        "scans and odometry differ, SR-CLK-002 says by how much.",
+    ),
+    "SR-CLK-005": Explanation(
+        "Stamps that cannot be",
+        "Are there zero stamps, stamps that go back or repeat, or that are later than the log "
+        "time?",
+        "Counted in the order of the log times, by topic and on tf by edge. Later than the log "
+        "time: all of a topic by 5 ms and 3 times its jitter, or single ones by 20 ms.",
+        "A recorder that rounds its times down, or runs on another computer, makes sound stamps "
+        "look late; some drivers hand scans on in another order than they were taken.",
+    ),
+    "SR-CLK-006": Explanation(
+        "Gaps in a sensor's stream",
+        "Did each sensor speak at its own rate all the time?",
+        "Intervals of five periods and 0.25 s or longer, on the bundle's clock; missing messages "
+        "are counted by the periods that intervals span. Only streams that keep a rate.",
+        "A sensor that was switched off on purpose; a recorder that dropped messages looks the "
+        "same as a driver that did.",
+    ),
+    "SR-CLK-007": Explanation(
+        "A transform is dated ahead on purpose",
+        "Do a transform's stamps lie a constant in front of what it was made from?",
+        "Each stamp minus the lead is the stamp of a scan, to the millisecond, in 80 of 100 "
+        "(AMCL: transform_tolerance, 1.0 s by default); else the lead over the log time is "
+        "constant.",
+        "No fault: other nodes can use the transform until the next one comes. A lead over the log "
+        "time alone may be a clock that runs ahead.",
+    ),
+    "SR-TF-001": Explanation(
+        "The tf tree is not one",
+        "Has every frame one parent, without a cycle, and every fixed transform one value?",
+        "Edges as they were published; of several parents the one stays that connects more, a "
+        "cycle loses its thinnest edge, of several fixed values the last one holds.",
+        "A robot description that was changed while the log ran, on purpose.",
+    ),
+    "SR-TF-002": Explanation(
+        "Two publishers of one transform",
+        "Does a transform go back and forth between two values?",
+        "Samples in the order they were recorded that lie beyond 2 cm and 4 usual steps from both "
+        "neighbours, which agree with each other to half of that; five times and in 2 of 100.",
+        "One publisher that cannot decide between two answers, as a localizer between two places.",
+    ),
+    "SR-TF-003": Explanation(
+        "Transforms were not there for scans",
+        "Was there, for each scan, a transform before and after it, close by, and in time?",
+        "Moving edges between odometry and the laser at the scan's stamp: outside of their "
+        "samples, between two that are five periods apart, recorded more than 0.2 s after the "
+        "scan, or forgotten by tf2's buffer of 10 s.",
+        "What waited in the recorder waited less on the robot. Scans at the ends of a log have no "
+        "transform because it was cut there.",
+    ),
+    "SR-TF-004": Explanation(
+        "Odometry jumps",
+        "Does odometry make steps that no robot can?",
+        "Steps beyond three times the median speed of the ten around, plus 10 m/s2 (20 rad/s2) "
+        "over half the square of the time, plus 5 cm (0.1 rad). REP-105 has odom -> base "
+        "continuous.",
+        "Odometry that was set to zero on purpose; visual odometry of low rate.",
+    ),
+    "SR-TF-005": Explanation(
+        "Large corrections",
+        "How far did each word of the localizer move the robot in the map?",
+        "T_map_base with the new and the old map -> odom at the same T_odom_base: at the robot, "
+        "not at the odometry frame's origin, which a small turn moves far.",
+        "The robot was told its pose, or found itself again: a right correction is as large as the "
+        "error before it.",
+    ),
+    "SR-TF-006": Explanation(
+        "Frames that hang nowhere",
+        "Are all frames that messages name tied to the robot by tf?",
+        "Frames of scans, points, IMU, odometry, poses and maps without a path to the base.",
+        "Fixed transforms that were latched before the recorder began are not in the log.",
     ),
     "SR-ODO-001": Explanation(
         "Odometry and the robot moved otherwise",
@@ -222,5 +313,30 @@ FINDINGS: dict[str, Explanation] = {
         "Was everything in the log readable?",
         "Counts by reason, from the manifest.",
         "Repairs are harmless more often than not; losses may hide the moment in question.",
+    ),
+    "SR-DAT-003": Explanation(
+        "Placeholders instead of numbers",
+        "Do covariances, rates and velocities say something, or do they only fill the message?",
+        "All zero; one and the same although the robot moved 0.5 m; variances of 1e-9 and less "
+        "or 1e5 and more; odometry as sure after 5 m and more as before; not positive; an IMU's "
+        "-1; a sensor that is the same to the last bit. The tables keep them; estimators, "
+        "hindsight and verdict find them not given.",
+        "A covariance that is meant as a constant of the sensor (IMU, velocities) is none.",
+    ),
+    "SR-DAT-004": Explanation(
+        "Numbers that are none",
+        "Are velocities, rates and covariances finite?",
+        "Rows with an infinity or not-a-number, by column. Poses without finite numbers are lost "
+        "while reading (SR-DAT-002).",
+        "Some drivers use them for what they do not measure.",
+    ),
+    "SR-DAT-005": Explanation(
+        "A laser's numbers do not fit",
+        "Do ranges change, and do angles and times fit the number of beams and the rate?",
+        "Scans without any beam that says something, with one range in all beams, or the same to "
+        "the last bit as the one before although the robot moved; angle_max, scan_time and "
+        "time_increment against increments, beams and the period of the scans.",
+        "A laser that sends every second scan takes half the period for a sweep; a simulator "
+        "without noise repeats itself where nothing moves.",
     ),
 }

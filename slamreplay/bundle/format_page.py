@@ -19,6 +19,13 @@ it was recorded (null where there is none), `t_log_ns` is when the recorder wrot
 are sorted by `t_ns`. Vectors and matrices are fixed-size lists, ragged ones are lists. Unit, frame
 and meaning of each column stand in the Parquet files' own metadata too. The id is the hash of the
 manifest, which holds the hashes of everything else: the same log gives the same bytes.
+
+Placeholders stay as they were recorded: covariances that are all zero, constant although the robot
+moved, 1e6 or 1e-9, or odometry's that never grow; rates and velocities that are the same
+throughout. They are judged over a whole topic, and estimators, hindsight, checks and the verdict,
+which read a view of the bundle, find NaN in their stead: not given. Only where a message type has
+a mark of its own for that (an Imu's covariance that starts with -1, an unknown covariance of a
+satellite fix) the table holds NaN already.
 """
 
 

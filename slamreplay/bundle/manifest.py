@@ -74,6 +74,16 @@ class FrameEdge(_Strict):
     samples: int
 
 
+class LeftOutEdge(_Strict):
+    """An edge that was on tf and is not in the tree, for with it there would be none."""
+
+    parent: str
+    child: str
+    samples: int
+    fault: Literal["second parent", "cycle"]
+    reason: str
+
+
 class Frames(_Strict):
     """The frames that carry the contract, null where the log has none, and the whole tree."""
 
@@ -81,6 +91,7 @@ class Frames(_Strict):
     odom: str | None
     base: str | None
     tree: list[FrameEdge]
+    left_out: list[LeftOutEdge] = []
 
 
 class MapVersion(_Strict):
@@ -101,6 +112,11 @@ class TableEntry(_Strict):
     start_ns: int | None
     end_ns: int | None
     sha256: str
+
+
+#: Reasons of losses that an audit looks for.
+LEADING_SLASH = "leading slash taken off frame names"
+ODD_ANGLES = "angle_max does not fit angle_min, angle_increment and the beams: angle_max ignored"
 
 
 class Loss(_Strict):

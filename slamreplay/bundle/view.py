@@ -11,6 +11,7 @@ from types import MappingProxyType
 import numpy as np
 
 from slamreplay.bundle.manifest import Manifest
+from slamreplay.bundle.placeholders import without_placeholders
 from slamreplay.bundle.schema import JUDGING_KINDS, SENSED_KINDS, TABLES
 from slamreplay.bundle.store import read_grid, read_manifest, read_table
 from slamreplay.bundle.tables import Table
@@ -51,6 +52,7 @@ class Bundle:
         self.manifest = manifest
         self.path = path
         self._tables = dict(tables)
+        self._evidence: dict[str, Table] = {}
         self._grids = dict(grids)
 
     @classmethod
@@ -63,7 +65,7 @@ class Bundle:
         return cls(read_manifest(path), {}, {}, path)
 
     def table(self, name: str) -> Table:
-        """A table by name, references of every kind included."""
+        """A table by name as it was recorded, references of every kind included."""
         if name not in self._tables:
             on_disk = self.path is not None
             self._tables[name] = (
@@ -72,6 +74,13 @@ class Bundle:
                 else Table.empty(TABLES[name])
             )
         return self._tables[name]
+
+    def evidence(self, name: str) -> Table:
+        """A table by name, NaN where a number is only a placeholder (bundle.placeholders)."""
+        if name not in self._evidence:
+            map_frame = self.manifest.frames.map
+            self._evidence[name] = without_placeholders(self.table(name), map_frame)
+        return self._evidence[name]
 
     def grid(self) -> OccupancyGrid | None:
         """The active map: the newest version the manifest lists, or None."""
@@ -94,7 +103,7 @@ class Bundle:
 
 @dataclass(frozen=True, eq=False)
 class BundleView:
-    """The evidence an estimator may read. References that only judge are not in it.
+    """The evidence an estimator may read: without references that only judge, NaN for placeholders.
 
     Attributes:
         bundle: what lies beneath.
@@ -117,6 +126,14 @@ class BundleView:
 
     def table(self, name: str) -> Table:
         """A table by name; of references only those the robot itself sensed."""
+        if name in self.tables:
+            return self.tables[name]
+        if name == "references":
+            return self.recorded(name)
+        return self.bundle.evidence(name)
+
+    def recorded(self, name: str) -> Table:
+        """A table by name with its placeholders, for whoever asks what they are."""
         if name in self.tables:
             return self.tables[name]
         table = self.bundle.table(name)

@@ -31,7 +31,7 @@ def ingest(
     """Read a log into a bundle: immutable, columnar, hashed."""
     from slamreplay.cli.inspect import show
     from slamreplay.cli.progress import progress_bar
-    from slamreplay.ingest.audit import inspect
+    from slamreplay.consistency.inspection import inspect, summary
     from slamreplay.ingest.pipeline import ingest as run
 
     given = o.ingest_options(
@@ -39,5 +39,5 @@ def ingest(
     )
     with progress_bar("reading") as progress:
         bundle = run(logs, output, given, progress=progress)
-    show(inspect(bundle), as_json=json, brief=True)
+    show(inspect(bundle) if json else summary(bundle), as_json=json, brief=True)
     typer.echo(f"wrote {output}", err=True)

@@ -29,8 +29,8 @@ def inspect(
     end: o.End = None,
     json: o.Json = False,
 ) -> None:
-    """Show what is in a bundle or log, what is missing, and its clocks and frames."""
-    from slamreplay.ingest.audit import inspect as look
+    """Show what is in a bundle or log, what is missing, and whether its clocks and tf hold."""
+    from slamreplay.consistency.inspection import inspect as look
 
     given = o.ingest_options(
         map_yaml=map_yaml, topics=topics, robot=robot, reference=reference, start_s=start, end_s=end
@@ -40,7 +40,7 @@ def inspect(
 
 
 def show(answers: dict[str, Any], *, as_json: bool, brief: bool = False) -> None:
-    """Print the answers on stdout; `brief` leaves the clock and tf audit out."""
+    """Print the answers on stdout; `brief` leaves the audit out."""
     if as_json:
         typer.echo(jsonlib.dumps(answers, indent=1, allow_nan=False))
         return
@@ -60,8 +60,13 @@ def show(answers: dict[str, Any], *, as_json: bool, brief: bool = False) -> None
         console.print(f"clock: {clock['name']}, {clock['reason']}", markup=False)
         console.print(_clock(answers))
         _print_frames(console, answers["frames"])
+        console.print(_findings(answers))
     if answers["losses"]:
         console.print(_losses(answers))
+
+
+#: Columns of numbers.
+_RIGHT = frozenset({"messages", "Hz", "count", "rows", "median s", "p95 s", "drift ppm", "gaps"})
 
 
 def _grid(title: str, *columns: str) -> Table:
@@ -70,8 +75,17 @@ def _grid(title: str, *columns: str) -> Table:
 
     table = Table(title=title, title_justify="left", box=box.SIMPLE_HEAD)
     for column in columns:
-        right = column in ("messages", "Hz", "count", "rows", "median s", "p95 s")
-        name = column in ("role", "topic", "table", "what")
+        right = column in (
+            "messages",
+            "Hz",
+            "count",
+            "rows",
+            "median s",
+            "p95 s",
+            "drift ppm",
+            "gaps",
+        )
+        name = column in ("role", "topic", "table", "what", "id")
         table.add_column(
             column, justify="right" if right else "left", overflow="fold", no_wrap=name
         )
@@ -122,7 +136,8 @@ def _maps(answers: dict[str, Any]) -> Table:
 
 def _clock(answers: dict[str, Any]) -> Table:
     title = "Log time minus header stamp"
-    table = _grid(title, "topic", "table", "rows", "Hz", "median s", "p95 s", "placed by")
+    table = _grid(title, "topic", "table", "rows", "Hz", "median s", "p95 s", "drift ppm", "gaps",
+                  "placed by")  # fmt: skip
     for topic in answers["clock"]["topics"]:
         table.add_row(
             _text(topic["topic"]),
@@ -131,8 +146,19 @@ def _clock(answers: dict[str, Any]) -> Table:
             _number(topic["rate_hz"], 1),
             _number(topic["log_minus_stamp_median_s"]),
             _number(topic["log_minus_stamp_p95_s"]),
+            _number(topic["drift_ppm"], 0),
+            "-" if topic["gap_count"] is None else str(topic["gap_count"]),
             topic["by"],
         )
+    return table
+
+
+def _findings(answers: dict[str, Any]) -> Table | str:
+    if not answers["findings"]:
+        return "Clocks, tf and numbers: nothing to remark."
+    table = _grid("Clocks, tf and numbers", "id", "severity", "what was found")
+    for finding in answers["findings"]:
+        table.add_row(finding["id"], finding["severity"], _text(finding["message"]))
     return table
 
 
@@ -148,8 +174,7 @@ def _print_frames(console: Any, frames: dict[str, Any]) -> None:
 
     def grow(node: Tree, frame: str) -> None:
         for edge in below.get(frame, []):
-            how = "static" if edge["is_static"] else f"{edge['samples']} samples"
-            grow(node.add(f"{_text(edge['child'])} ({how})"), edge["child"])
+            grow(node.add(f"{_text(edge['child'])} ({_edge(edge)})"), edge["child"])
 
     for root in sorted(set(below) - children):
         tree = Tree(_text(root))
@@ -158,6 +183,19 @@ def _print_frames(console: Any, frames: dict[str, Any]) -> None:
     if frames["without_tf"]:
         names = ", ".join(frames["without_tf"])
         console.print(f"sensor frames without tf, taken to be the base: {names}", markup=False)
+
+
+def _edge(edge: dict[str, Any]) -> str:
+    if edge["is_static"]:
+        return "static"
+    words = [f"{edge['samples']} samples"]
+    if edge["rate_hz"] is not None:
+        words.append(f"{edge['rate_hz']:.1f} Hz")
+    if edge["ahead_s"] is not None:
+        words.append(f"dated {edge['ahead_s']:.3f} s ahead of the {edge['ahead_of']}")
+    if edge["gaps"]:
+        words.append(f"{edge['gaps']} gaps up to {edge['longest_gap_s']:.2f} s")
+    return ", ".join(words)
 
 
 def _losses(answers: dict[str, Any]) -> Table:

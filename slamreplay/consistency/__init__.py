@@ -7,8 +7,26 @@ CHECKS = Registry(
     {
         "clock": "slamreplay.consistency.clock:check",
         "covariance": "slamreplay.consistency.validity:check",
+        "lasers": "slamreplay.consistency.lasers:check",
         "losses": "slamreplay.consistency.completeness:check_losses",
         "missing": "slamreplay.consistency.completeness:check_missing",
         "nees": "slamreplay.consistency.credibility:check",
+        "numbers": "slamreplay.consistency.numbers:check",
+        "stamps": "slamreplay.consistency.stamps:check",
+        "tf_steps": "slamreplay.consistency.tf_steps:check",
+        "tf_times": "slamreplay.consistency.tf_times:check",
+        "tf_tree": "slamreplay.consistency.tf_tree:check",
     },
+)
+
+#: The checks that need neither a belief nor hindsight: `slamreplay inspect` asks them too.
+AUDITS = (
+    "clock",
+    "stamps",
+    "tf_tree",
+    "tf_times",
+    "tf_steps",
+    "covariance",
+    "numbers",
+    "lasers",
 )

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
+from slamreplay.audit.log_audit import LogAudit
 from slamreplay.bundle.track import PoseTrack
 from slamreplay.bundle.view import BundleView
 
@@ -24,3 +26,8 @@ class CheckContext:
     reference: PoseTrack | None
     reference_kind: str | None
     view: BundleView
+
+    @cached_property
+    def audit(self) -> LogAudit:
+        """What was measured of the log's clocks, transforms and numbers."""
+        return LogAudit(self.view)

@@ -92,8 +92,9 @@ def is_positive_definite(covariance: ArrayLike) -> NDArray[np.bool_]:
     cov = np.asarray(covariance, dtype=np.float64)
     flat = cov.reshape((-1, *cov.shape[-2:]))
     sound = np.asarray(np.isfinite(flat).all(axis=(1, 2)))
-    scale = np.abs(np.where(np.isfinite(flat), flat, 0.0)).max(axis=(1, 2), initial=0.0)
-    skew = np.abs(np.where(sound[:, None, None], flat - np.swapaxes(flat, 1, 2), 0.0))
+    inside = np.where(sound[:, None, None], flat, 0.0)  # an infinity minus itself would warn
+    scale = np.abs(inside).max(axis=(1, 2), initial=0.0)
+    skew = np.abs(inside - np.swapaxes(inside, 1, 2))
     sound &= skew.max(axis=(1, 2), initial=0.0) <= 1e-9 * scale
     sound[sound] = np.linalg.eigvalsh(flat[sound])[:, 0] > 0.0
     return sound.reshape(cov.shape[:-2])

@@ -50,10 +50,11 @@ def settle_cast(topics: Sequence[TopicRows], overrides: Mapping[str, str]) -> Ca
     Raises:
         UsageError: a topic's type cannot play the role it was given.
     """
-    tf_rows, tree, losses = settle([t for t in topics if t.table == "transforms"])
+    settled = settle([t for t in topics if t.table == "transforms"])
+    tf_rows = settled.topics
     others, ended = settle_changes([t for t in topics if t.table != "transforms"])
     others += told_in_logs(others)
-    losses = [*losses, *ended]
+    losses = [*settled.losses, *ended]
     free = _not_given(others, overrides)
     given = {r: _given(r, n, [*others, *tf_rows]) for r, n in overrides.items() if r in ROLE_TABLES}
     found: dict[str, Choice | None] = {
@@ -69,8 +70,8 @@ def settle_cast(topics: Sequence[TopicRows], overrides: Mapping[str, str]) -> Ca
     map_frames = _map_frames(others, found)
     named = overrides
     if found["odometry"] is None:
-        here = find_frames(tree, None, map_frames, overrides, lambda *_: False)
-        made, lost = _dead_reckoned(free("velocity"), found, tree, here)
+        here = find_frames(settled.tree, None, map_frames, overrides, lambda *_: False)
+        made, lost = _dead_reckoned(free("velocity"), found, settled.tree, here)
         losses += lost
         if made is not None:
             others.append(made.rows)
@@ -87,7 +88,8 @@ def settle_cast(topics: Sequence[TopicRows], overrides: Mapping[str, str]) -> Ca
         return topic is not None
 
     odometry_rows = odometry.rows if odometry else None
-    frames = find_frames(tree, odometry_rows, map_frames, named, is_disguise)
+    frames = find_frames(settled.tree, odometry_rows, map_frames, named, is_disguise)
+    frames = frames.model_copy(update={"left_out": settled.left_out})
     for frame, topic in disguised.items():
         if frame != frames.map:
             frames, tf_rows, loss = without_frame(frame, topic, frames, tf_rows)

@@ -1,4 +1,4 @@
-"""Which clock drives the replay, and each row's time on it.
+"""Which clock drives the replay.
 
 Header stamps say when something was measured, log times when it was written down. The sensors'
 clock is read off one dense, steadily stamped stream; log times are carried over to it with the
@@ -12,8 +12,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from slamreplay.bundle.manifest import Clock, Loss
-from slamreplay.geometry.times import NO_STAMP, NS_PER_S, Times, in_order
+from slamreplay.bundle.manifest import Clock
+from slamreplay.geometry.times import NO_STAMP, NS_PER_S, Times
 from slamreplay.ingest.names import is_reference
 from slamreplay.ingest.rows import TopicRows
 
@@ -23,83 +23,15 @@ OTHER_TABLES = ("transforms", "poses", "particles")
 #: A row farther than this from where its log time puts it was stamped by another clock. Latched
 #: and delayed messages stay well below, clocks of another epoch well above.
 OTHER_EPOCH_NS = 60 * NS_PER_S
-#: A clock that steps back by more than this while the log goes on is not one to replay on.
-JUMP_NS = NS_PER_S
-
-
-def choose_clock(topics: Sequence[TopicRows]) -> Clock:
-    """The clock that most dense sensor streams are stamped with, or the log's own."""
-    problems: list[str] = []
-    sound = []
-    for topic in topics:
-        if is_reference(topic.topic):  # it only judges: nothing may hang on its being there
-            continue
-        if topic.table in (*SENSOR_TABLES, *OTHER_TABLES) and len(topic) and not _static(topic):
-            problem = _problem(topic)
-            if problem is None:
-                sound.append(topic)
-            elif topic.table in SENSOR_TABLES:
-                problems.append(f"{topic.topic}: {problem}")
-    ranked = [t for t in sound if t.table in SENSOR_TABLES] or sound
-    if not ranked:
-        why = "; ".join(problems) or "no message carries a header stamp"
-        return Clock(name="log", reason=f"log times, for header stamps cannot be used ({why})",
-                     knots=[])  # fmt: skip
-    offsets = {id(t): float(np.median(_offsets(t) / NS_PER_S)) for t in ranked}
-    majority = max(ranked, key=lambda t: (_agreeing(t, ranked, offsets), len(t), t.topic))
-    close = [t for t in ranked if abs(offsets[id(t)] - offsets[id(majority)]) < 1.0]
-    dense = [t for t in close if 4 * len(t) >= max(len(c) for c in close)]
-    # The stream with the least delay between stamp and log is nearest to the clocks' true offset.
-    chosen = max(dense, key=lambda t: (offsets[id(t)], len(t), t.topic))
-    offset = offsets[id(chosen)]
-    reason = f"header stamps; log times are carried over with {chosen.topic} ({offset:+.3f} s)"
-    if problems:
-        reason += f"; not used: {'; '.join(problems)}"
-    return Clock(name="sensor", reason=reason, knots=_knots(chosen))
-
-
-def row_times(topic: TopicRows, clock: Clock) -> tuple[Times, list[Loss]]:
-    """Each row's time on the clock (N,), and what was wrong with its stamps.
-
-    A usable stamp is taken as it is. Rows without one, or with one of another epoch, get their log
-    time carried over to the clock.
-    """
-    from_log = clock.from_log_time(topic.t_log_ns)
-    if clock.name == "log":
-        return from_log, []
-    stamped = topic.t_sensor_ns != NO_STAMP
-    if not stamped.any() and topic.type in _UNSTAMPED:
-        return from_log, []
-    away = np.where(stamped, topic.t_sensor_ns - from_log, 0)
-    foreign = stamped & (np.abs(away) > OTHER_EPOCH_NS)
-    if _static(topic):
-        return np.where(stamped & ~foreign, topic.t_sensor_ns, from_log), []
-    losses = []
-    if not stamped.all():
-        reason = "header stamp is zero, placed by log time"
-        losses.append(_repaired(topic, int((~stamped).sum()), reason))
-    # Only rows that agree with the clock prove a topic's stamps; one that jumps proves nothing.
-    back_ns = 0 if topic.type.startswith(_IN_ORDER) else JUMP_NS
-    judged = topic.table in (*SENSOR_TABLES, "poses") and not foreign.all()
-    if judged and _jumps(topic, ~foreign, back_ns):
-        reason = "header stamps jump, placed by log time"
-        losses.append(_repaired(topic, int(stamped.sum()), reason))
-        return from_log, losses
-    if foreign.any():
-        seconds = float(np.median(away[foreign])) / NS_PER_S
-        reason = f"stamped by another clock ({seconds:+.0f} s), placed by log time"
-        losses.append(_repaired(topic, int(foreign.sum()), reason))
-    t_ns = np.where(stamped & ~foreign, topic.t_sensor_ns, from_log)
-    if topic.type.startswith(_IN_ORDER):
-        t_ns, moved = in_order(t_ns)
-        if moved.any():
-            reason = "header stamps step back, placed between their neighbours"
-            losses.append(_repaired(topic, int(moved.sum()), reason))
-    return t_ns, losses
-
-
+#: Sensors' latencies stay below this: a stream that lies farther off all the time is on another
+#: clock.
+SKEW_NS = 5 * NS_PER_S
+#: Stamps this far ahead of the log time are dated ahead, where others of the same clock are not.
+AHEAD_S = 0.1
+#: A recorder that is late by this much has stalled; it catches up within so many seconds.
+STALL_NS, AROUND = NS_PER_S // 10, 8
 #: What has no header: a log time is all it ever had.
-_UNSTAMPED = frozenset(
+UNSTAMPED = frozenset(
     {
         "geometry_msgs/msg/Twist",
         "map_server",
@@ -124,15 +56,53 @@ _UNSTAMPED = frozenset(
 )
 #: Types of logs that one process wrote line by line as messages came, each topic from one
 #: publisher: of two rows the later one is the later one, whatever the stamps say.
-_IN_ORDER = ("carmen/", "mrclam/")
+IN_ORDER = ("carmen/", "mrclam/")
+#: A clock that steps back by more than this while the log goes on is not one to replay on.
+JUMP_NS = NS_PER_S
 
 
-def _static(topic: TopicRows) -> bool:
+def choose_clock(topics: Sequence[TopicRows]) -> Clock:
+    """The clock that most kinds of evidence are stamped with, or the log's own.
+
+    Kinds count before messages: scans and odometry on one clock outvote a fast IMU on another.
+    """
+    problems: list[str] = []
+    sound = []
+    for topic in topics:
+        if is_reference(topic.topic):  # it only judges: nothing may hang on its being there
+            continue
+        if topic.table in (*SENSOR_TABLES, *OTHER_TABLES) and len(topic) and not is_static(topic):
+            problem = _problem(topic)
+            if problem is None:
+                sound.append(topic)
+            elif topic.table in SENSOR_TABLES:
+                problems.append(f"{topic.topic}: {problem}")
+    ranked = [t for t in sound if t.table in SENSOR_TABLES] or sound
+    if not ranked:
+        why = "; ".join(problems) or "no message carries a header stamp"
+        return Clock(name="log", reason=f"log times, for header stamps cannot be used ({why})",
+                     knots=[])  # fmt: skip
+    offsets = {id(t): float(np.median(_offsets(t) / NS_PER_S)) for t in sound}
+    majority = max(ranked, key=lambda t: (*_votes(t, sound, offsets), len(t), t.topic))
+    close = [t for t in ranked if abs(offsets[id(t)] - offsets[id(majority)]) < 1.0]
+    # The stream with the least delay between stamp and log is nearest to the clocks' true offset,
+    # unless it is dated ahead: no message is recorded before it was made.
+    close = [t for t in close if offsets[id(t)] <= AHEAD_S] or close
+    dense = [t for t in close if 4 * len(t) >= max(len(c) for c in close)]
+    chosen = max(dense, key=lambda t: (offsets[id(t)], len(t), t.topic))
+    offset = offsets[id(chosen)]
+    kind = "header stamps of simulated time" if _is_simulated(chosen) else "header stamps"
+    reason = f"{kind}; log times are carried over with {chosen.topic} ({offset:+.3f} s)"
+    others = [t for t in ranked if abs(offsets[id(t)] - offset) * NS_PER_S > SKEW_NS]
+    problems += [f"{t.topic}: {offsets[id(t)] - offset:+.0f} s off" for t in others]
+    if problems:
+        reason += f"; not used: {'; '.join(problems)}"
+    return Clock(name="sensor", reason=reason, knots=_knots(chosen))
+
+
+def is_static(topic: TopicRows) -> bool:
+    """Whether rows hold at all times, whenever they were stamped."""
     return topic.table == "transforms" and topic.topic.endswith("tf_static")
-
-
-def _repaired(topic: TopicRows, count: int, reason: str) -> Loss:
-    return Loss(kind="repaired", what=topic.topic, count=count, reason=reason)
 
 
 def _offsets(topic: TopicRows) -> NDArray[np.int64]:
@@ -140,26 +110,40 @@ def _offsets(topic: TopicRows) -> NDArray[np.int64]:
     return np.asarray((topic.t_sensor_ns - topic.t_log_ns)[stamped])
 
 
-def _agreeing(topic: TopicRows, among: Sequence[TopicRows], offsets: dict[int, float]) -> int:
-    """Rows, of all topics, on the same clock as `topic`."""
+def _votes(
+    topic: TopicRows, among: Sequence[TopicRows], offsets: dict[int, float]
+) -> tuple[int, int, bool, int]:
+    """Of what is on the same clock as `topic`: kinds of sensors, all kinds, scans, sensors' rows.
+
+    A localizer's topics come second: it may run on another computer than the sensors.
+    """
     own = offsets[id(topic)]
-    limit = OTHER_EPOCH_NS / NS_PER_S
-    return sum(len(t) for t in among if abs(offsets[id(t)] - own) < limit)
+    same = [t for t in among if abs(offsets[id(t)] - own) * NS_PER_S < SKEW_NS]
+    tables = {t.table for t in same}
+    rows = sum(len(t) for t in same if t.table in SENSOR_TABLES)
+    return len(tables & {*SENSOR_TABLES}), len(tables), "scans" in tables, rows
+
+
+def _is_simulated(topic: TopicRows) -> bool:
+    """Whether stamps count from zero while the log's time is of this century."""
+    epoch = 1_000_000_000 * NS_PER_S
+    stamps = topic.t_sensor_ns[topic.t_sensor_ns != NO_STAMP]
+    return bool(np.median(stamps) < epoch < np.median(topic.t_log_ns))
 
 
 def _problem(topic: TopicRows) -> str | None:
     """Why a topic's stamps are no clock, or None."""
     stamped = topic.t_sensor_ns != NO_STAMP
     if not stamped.any():
-        return "no header stamps" if topic.type in _UNSTAMPED else "header stamps are zero"
+        return "no header stamps" if topic.type in UNSTAMPED else "header stamps are zero"
     if stamped.mean() < 0.9:
         return f"{int((~stamped).sum())} of {len(topic)} header stamps are zero"
     if len(topic) > 2 and np.ptp(topic.t_sensor_ns[stamped]) == 0:
         return "all header stamps are equal"
-    return "header stamps jump" if _jumps(topic, stamped) else None
+    return "header stamps jump" if stamps_jump(topic, stamped) else None
 
 
-def _jumps(topic: TopicRows, usable: NDArray[np.bool_], back_ns: int = JUMP_NS) -> bool:
+def stamps_jump(topic: TopicRows, usable: NDArray[np.bool_], back_ns: int = JUMP_NS) -> bool:
     """Whether stamps go back by more than a second (or `back_ns`) in over one row of a hundred.
 
     Transforms of several publishers are interleaved and latched rows repeat, so a few are normal.
@@ -189,9 +173,10 @@ def _near_line(t_log: Times, offset: NDArray[np.int64]) -> NDArray[np.bool_]:
 def _knots(topic: TopicRows) -> list[tuple[int, int]]:
     """(log time, clock time) about every second: medians over the second, robust to delays.
 
-    Where stamps step back a second may hold more wrong stamps than right ones, a minute does not.
+    Seconds in which a recorder stalled lie in a valley of the offset, and are left out. Where
+    stamps step back a second may hold more wrong stamps than right ones, a minute does not.
     """
-    every_ns = 60 * NS_PER_S if topic.type.startswith(_IN_ORDER) else NS_PER_S
+    every_ns = 60 * NS_PER_S if topic.type.startswith(IN_ORDER) else NS_PER_S
     stamped = topic.t_sensor_ns != NO_STAMP
     t_log = topic.t_log_ns[stamped]
     offset = topic.t_sensor_ns[stamped] - t_log
@@ -204,4 +189,19 @@ def _knots(topic: TopicRows) -> list[tuple[int, int]]:
         middle = int(t_log[start] + (t_log[end - 1] - t_log[start]) // 2)
         base = int(offset[start])  # the median of small differences is exact in float64
         knots.append((middle, middle + base + round(float(np.median(offset[start:end] - base)))))
-    return knots
+    return [knot for knot, stalled in zip(knots, _valleys(knots), strict=True) if not stalled]
+
+
+def _valleys(knots: Sequence[tuple[int, int]]) -> NDArray[np.bool_]:
+    """Which knots lie lower than others shortly before and shortly after them.
+
+    The pace is taken out; a clock that was set, or simulated time that was paused, stays there.
+    """
+    log = np.array([k[0] - knots[0][0] for k in knots], dtype=np.float64)
+    offset = np.array([k[1] - k[0] - (knots[0][1] - knots[0][0]) for k in knots], dtype=np.float64)
+    if len(knots) > 1:
+        offset -= log * float(np.median(np.diff(offset) / np.maximum(np.diff(log), 1.0)))
+    around = np.pad(offset, AROUND, mode="edge")
+    windows = np.lib.stride_tricks.sliding_window_view(around, AROUND + 1)
+    before, after = windows[: len(offset)].max(axis=1), windows[AROUND:].max(axis=1)
+    return np.asarray(offset < np.minimum(before, after) - STALL_NS)

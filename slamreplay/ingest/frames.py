@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from slamreplay.bundle.manifest import FrameEdge, Frames, Loss
+from slamreplay.bundle.manifest import FrameEdge, Frames, LeftOutEdge, Loss
 from slamreplay.ingest.names import basename, is_base_frame, is_map_frame, is_odom_frame
 from slamreplay.ingest.rows import TopicRows
 
@@ -25,8 +25,18 @@ class _Edge:
     is_constant: bool
 
 
-def settle(topics: Sequence[TopicRows]) -> tuple[list[TopicRows], list[FrameEdge], list[Loss]]:
-    """Tf rows that form a forest, its edges, and what had to be left out or held.
+@dataclass(frozen=True, eq=False)
+class Settled:
+    """Tf rows that form a forest, its edges, and what had to be left out or held."""
+
+    topics: list[TopicRows]
+    tree: list[FrameEdge]
+    left_out: list[LeftOutEdge]
+    losses: list[Loss]
+
+
+def settle(topics: Sequence[TopicRows]) -> Settled:
+    """Make a forest of tf rows.
 
     Rows of /tf_static are static, and so is an edge of /tf that never changes and does not carry
     the robot (ROS 1 publishes fixed joints that way): it is held at all times. Of several parents
@@ -43,16 +53,26 @@ def settle(topics: Sequence[TopicRows]) -> tuple[list[TopicRows], list[FrameEdge
         what = "edge never changes" if len(held) == 1 else "edges never change"
         reason = f"{len(held)} {what}: held at all times"
         losses.append(Loss(kind="repaired", what="tf", count=count, reason=reason))
-    dropped = _second_parents(edges)
-    kept = {pair: edge for pair, edge in edges.items() if pair not in dropped}
-    dropped |= _cycles(kept)
-    for pair, reason in sorted(dropped.items()):
-        what = f"tf {pair[0]} -> {pair[1]}"
-        losses.append(Loss(kind="skipped", what=what, count=edges[pair].samples, reason=reason))
-    kept = {pair: edge for pair, edge in edges.items() if pair not in dropped}
+    seconds = _second_parents(edges)
+    kept = {pair: edge for pair, edge in edges.items() if pair not in seconds}
+    rings = _cycles(kept)
+    left_out = []
+    for pair, reason in sorted({**seconds, **rings}.items()):
+        what, count = f"tf {pair[0]} -> {pair[1]}", edges[pair].samples
+        losses.append(Loss(kind="skipped", what=what, count=count, reason=reason))
+        left_out.append(
+            LeftOutEdge(
+                parent=pair[0],
+                child=pair[1],
+                samples=count,
+                fault="cycle" if pair in rings else "second parent",
+                reason=reason,
+            )
+        )
+    kept = {pair: edge for pair, edge in kept.items() if pair not in rings}
     tree = [FrameEdge(parent=e.parent, child=e.child, is_static=e.is_static, samples=e.samples)
             for _, e in sorted(kept.items())]  # fmt: skip
-    return [_rows_of(topic, kept) for topic in topics], tree, losses
+    return Settled([_rows_of(topic, kept) for topic in topics], tree, left_out, losses)
 
 
 def find_frames(

@@ -13,7 +13,7 @@ from slamreplay.bundle.store import MANIFEST, write_bundle
 from slamreplay.bundle.view import Bundle
 from slamreplay.ingest.assembly import Assembly
 from slamreplay.ingest.cast import Cast, settle_cast
-from slamreplay.ingest.clock import choose_clock, row_times
+from slamreplay.ingest.clock import choose_clock
 from slamreplay.ingest.clouds.second_pass import with_clouds
 from slamreplay.ingest.clouds.topics import cloud_topics
 from slamreplay.ingest.inferred import with_inferred
@@ -30,6 +30,7 @@ from slamreplay.ingest.reference_file import read_reference
 from slamreplay.ingest.repeats import REPEATS, without_repeats
 from slamreplay.ingest.robots import in_its_frames, refuse_mixture, topic_filter
 from slamreplay.ingest.roles import Choice
+from slamreplay.ingest.row_times import row_times
 from slamreplay.ingest.rows import TopicRows
 from slamreplay.ingest.span import clock_between, cut, evidence_span
 from slamreplay.ingest.tables import build

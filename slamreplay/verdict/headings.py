@@ -52,6 +52,8 @@ def _imu(view: BundleView) -> Heading | None:
         return None
     table = table.sorted_by_time()
     t, rate = table.t_ns, table["angular_velocity_xyz"]
+    if not np.isfinite(rate).any():  # a heading that never turns would be no witness
+        return None
     base, frame = view.manifest.frames.base, str(table["frame_id"][0])
     up = np.array([0.0, 0.0, 1.0])
     if base and view.transforms.has_path(base, frame):

@@ -15,12 +15,12 @@ from slamreplay.bundle.tables import Ragged
 from slamreplay.bundle.track import PoseTrack
 from slamreplay.bundle.view import BundleView
 from slamreplay.geometry.times import Times
-from slamreplay.ingest.clock import row_times
 from slamreplay.ingest.clouds.body import without_body
 from slamreplay.ingest.clouds.fields import Clouds
 from slamreplay.ingest.clouds.place import place_of
 from slamreplay.ingest.clouds.setting import Setting, settle
 from slamreplay.ingest.clouds.sweep import sweep_motion
+from slamreplay.ingest.row_times import row_times
 from slamreplay.ingest.rows import TopicRows
 
 

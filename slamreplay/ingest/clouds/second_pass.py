@@ -13,7 +13,7 @@ from slamreplay.bundle.tables import Table
 from slamreplay.bundle.view import Bundle, BundleView
 from slamreplay.geometry.times import NO_STAMP
 from slamreplay.ingest.cast import Cast
-from slamreplay.ingest.clock import choose_clock, row_times
+from slamreplay.ingest.clock import choose_clock
 from slamreplay.ingest.clouds.band import given_band
 from slamreplay.ingest.clouds.fields import Clouds
 from slamreplay.ingest.clouds.flattener import Flattener
@@ -21,6 +21,7 @@ from slamreplay.ingest.clouds.reading import cloud_batches, first_clouds
 from slamreplay.ingest.clouds.topics import CloudTopics, best_cloud
 from slamreplay.ingest.readers.reader import Reader
 from slamreplay.ingest.roles import Choice
+from slamreplay.ingest.row_times import row_times
 from slamreplay.ingest.rows import TopicRows
 from slamreplay.ingest.tables import build
 

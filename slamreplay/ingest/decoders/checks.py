@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from slamreplay.bundle.manifest import LEADING_SLASH
 from slamreplay.bundle.tables import Ragged
 from slamreplay.geometry import se3
 from slamreplay.geometry.times import Times
@@ -28,6 +29,19 @@ def pose_rows(
         Remark("lost", int((turned & ~placed).sum()), "position is not finite"),
     )
     return unit, turned & placed, remarks
+
+
+def slashed(*names: NDArray[Any]) -> Remark:
+    """The remark on rows of which a frame name, of texts (N,) each, begins with a slash.
+
+    tf2 knows no such names; the tf of ROS 1 added them.
+    """
+    odd = np.zeros(len(names[0]), dtype=bool)
+    for column in names:
+        slashes = [name for name in set(column.tolist()) if name.startswith("/")]
+        if slashes:
+            odd |= np.isin(column, slashes)
+    return Remark("repaired", int(odd.sum()), LEADING_SLASH)
 
 
 def kept(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from slamreplay.geometry import se3
+from slamreplay.ingest.decoders.checks import slashed
 from slamreplay.ingest.decoders.decoder import Decoded, Decoder, Messages, Remark
 
 
@@ -28,6 +29,7 @@ def _decode(messages: Messages) -> Decoded:
     remarks = (
         Remark("repaired", int((turned & ~sound).sum()), "quaternion normalised"),
         Remark("repaired", int((given & ~turned).sum()), "zero quaternion taken as not measured"),
+        slashed(messages.texts("header.frame_id")),
     )
     columns = {
         "frame_id": messages.frames(),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from slamreplay.ingest.decoders.checks import kept, pose_rows
+from slamreplay.ingest.decoders.checks import kept, pose_rows, slashed
 from slamreplay.ingest.decoders.decoder import Decoded, Decoder, Messages
 
 
@@ -21,7 +21,8 @@ def _decode(messages: Messages) -> Decoded:
         "angular_velocity_xyz": messages.columns("twist.twist.angular", "xyz"),
         "twist_covariance": messages.fixed("twist.covariance", 36),
     }
-    return kept(keep, columns, messages.every, messages.stamps(), remarks)
+    slashes = slashed(messages.texts("header.frame_id"), messages.texts("child_frame_id"))
+    return kept(keep, columns, messages.every, messages.stamps(), (*remarks, slashes))
 
 
 ODOMETRY = Decoder("odometry", _decode)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from slamreplay.ingest.decoders.checks import kept, pose_rows
+from slamreplay.ingest.decoders.checks import kept, pose_rows, slashed
 from slamreplay.ingest.decoders.decoder import Decoded, Decoder, Messages
 
 
@@ -22,7 +22,8 @@ def _decode(messages: Messages, path: str, covariance: np.ndarray) -> Decoded:
         "orientation_xyzw": orientation,
         "covariance": covariance,
     }
-    return kept(keep, columns, messages.every, messages.stamps(), remarks)
+    slashes = slashed(messages.texts("header.frame_id"))
+    return kept(keep, columns, messages.every, messages.stamps(), (*remarks, slashes))
 
 
 def _with_covariance(messages: Messages) -> Decoded:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from slamreplay.geometry.times import Times
-from slamreplay.ingest.decoders.checks import kept, pose_rows
+from slamreplay.ingest.decoders.checks import kept, pose_rows, slashed
 from slamreplay.ingest.decoders.decoder import Decoded, Decoder, Messages, Remark
 
 
@@ -16,7 +17,10 @@ def _decode(messages: Messages) -> Decoded:
     edges, rows = messages.children("transforms")
     pose = (edges.columns("transform.translation", "xyz"),
             edges.columns("transform.rotation", "xyzw"))  # fmt: skip
-    return edge_rows(edges.frames(), edges.frames("child_frame_id"), *pose, rows, edges.stamps())
+    names = (edges.frames(), edges.frames("child_frame_id"))
+    decoded = edge_rows(*names, *pose, rows, edges.stamps())
+    slashes = slashed(edges.texts("header.frame_id"), edges.texts("child_frame_id"))
+    return replace(decoded, remarks=(*decoded.remarks, slashes))
 
 
 def edge_rows(
