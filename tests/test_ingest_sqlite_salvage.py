@@ -4,6 +4,7 @@ import os
 import sqlite3
 from collections import defaultdict
 from contextlib import closing
+from itertools import cycle
 
 import apsw
 import numpy as np
@@ -269,14 +270,7 @@ def test_a_damaged_byte_costs_no_more_than_its_page_and_makes_nothing_up(sound, 
     salvaged = salvage(damaged(sound.path, content))
     found = list(salvaged.messages())
 
-    by_size = defaultdict(list)
-    for message in messages:
-        by_size[len(message[2])].append(message[2])
-    originals = {message[2] for message in messages}
-    for _, _, payload in found:
-        assert payload in originals or any(
-            differing(payload, original) == {flip} for original in by_size[len(payload)]
-        )
+    assert_nothing_made_up(found, messages, flip)
     untouched = {message[2] for message, pages in needs.items() if page not in pages}
     # A link of one chain of overflow pages into another leaves two that claim the same pages.
     assert len(untouched - {payload for *_, payload in found}) <= 1
@@ -285,11 +279,54 @@ def test_a_damaged_byte_costs_no_more_than_its_page_and_makes_nothing_up(sound, 
     assert salvaged.lost <= len(messages) - len(found) + 1
 
 
+def assert_nothing_made_up(found, messages, flip):
+    """Every payload is one of the messages', but for one flipped byte of its own."""
+    by_size = defaultdict(list)
+    for message in messages:
+        by_size[len(message[2])].append(message[2])
+    originals = {message[2] for message in messages}
+    for _, _, payload in found:
+        assert payload in originals or any(
+            differing(payload, original) == {flip} for original in by_size[len(payload)]
+        )
+
+
 def differing(one, other):
     """What the bytes that are not the same differ by; more than one of them is more than one."""
     changes = np.frombuffer(one, np.uint8) ^ np.frombuffer(other, np.uint8)
     changes = changes[changes > 0].tolist()
     return set(changes) if len(changes) == 1 else {0, *changes}
+
+
+def test_a_damaged_byte_above_the_leaves_costs_nothing(sound):
+    messages, page_size = sound.messages, sound.page_size
+    with closing(sqlite3.connect(sound.path)) as database:
+        statement = "SELECT rootpage FROM sqlite_master WHERE name = 'messages'"
+        (root,) = database.execute(statement).fetchone()
+    start = (root - 1) * page_size
+    used = [at for at in range(start, start + page_size) if sound.content[at]]
+    assert sound.content[start] == 5
+    for at, flip in zip(used[1:] * 2, cycle([1, 0x80, 3, 0x10, 0x40]), strict=False):
+        content = bytearray(sound.content)
+        content[at] ^= flip
+        salvaged = salvage(damaged(sound.path, content))
+        assert list(salvaged.messages()) == messages, (at - start, flip)
+        assert salvaged.lost == 0
+
+
+def test_a_damaged_byte_before_a_message_costs_that_message(sound):
+    messages, page_size = sound.messages, sound.page_size
+    page = max(pages.pop() for pages in map(set, sound.needs.values()) if len(pages) == 1)
+    start = (page - 1) * page_size
+    count = int.from_bytes(sound.content[start + 3 : start + 5])
+    for slot in range(start + 8, start + 8 + 2 * count, 2):
+        cell = start + int.from_bytes(sound.content[slot : slot + 2])
+        for at, flip in zip(range(cell, cell + 10), cycle([1, 2, 0x80]), strict=False):
+            content = bytearray(sound.content)
+            content[at] ^= flip
+            found = list(salvage(damaged(sound.path, content)).messages())
+            assert_nothing_made_up(found, messages, flip)
+            assert len(found) >= len(messages) - 1
 
 
 @slow

@@ -138,7 +138,8 @@ def salvage(path: Path) -> Salvaged:
     unread = _unread_pages(pages, header, found, schema, claimed)
     # Numbers that are missing are no loss where every page is accounted for.
     fullest = int(np.bincount(cells.page).max()) if len(cells) else pages.usable
-    gaps = int(np.minimum(absent(merged(tree.holes), cells.id), 1 << 40).sum())
+    seen = np.sort(np.concatenate([attached.id, orphans.id]))
+    gaps = int(np.minimum(absent(merged(tree.gaps), seen), 1 << 40).sum())
     numbers, counts = np.unique(cells.topic_id, return_counts=True)
     return Salvaged(
         topics,

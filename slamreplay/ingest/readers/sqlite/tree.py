@@ -40,19 +40,22 @@ class Tree:
         pages: (P+1,) whether a page belongs to it.
         leaves: (L,) its leaf pages.
         ranges: (L, 2) row ids (above, up to) that belong on each leaf.
-        holes: (H, 2) row ids (above, up to) some of which are on pages that were not found.
+        gaps: (H, 2) row ids (above, up to) that belong on pages that were not found.
+        holes: (H, 2) the same with safe bounds: one damaged key would not move them.
     """
 
     pages: Mask
     leaves: Ints
     ranges: Ints
+    gaps: Ints
     holes: Ints
 
 
 def no_tree(count: int) -> Tree:
     """The tree of a table whose root is unknown, in a file of `count` pages."""
     none = np.zeros((0, 2), dtype=np.int64)
-    return Tree(np.zeros(count + 1, dtype=bool), none[:, 0], none, np.array([[LOWEST, HIGHEST]]))
+    everything = np.array([[LOWEST, HIGHEST]])
+    return Tree(np.zeros(count + 1, dtype=bool), none[:, 0], none, everything, everything)
 
 
 def walk(structure: Structure, root: int) -> Tree:
@@ -68,17 +71,17 @@ def walk(structure: Structure, root: int) -> Tree:
     level = np.array([[root, LOWEST, HIGHEST, LOWEST, HIGHEST]], dtype=np.int64)
     while len(level):
         fits = _fits(structure, level, pages)
-        holes.append(level[~fits, 3:])
+        holes.append(level[~fits])
         level = level[fits]
         pages[level[:, 0]] = True
         is_leaf = structure.kinds[level[:, 0]] == LEAF
         leaves.append(level[is_leaf])
         level = level[~is_leaf]
-        holes.append(level[structure.damaged[level[:, 0]], 3:])
+        holes.append(level[structure.damaged[level[:, 0]]])
         level = _children(structure, level)
-    found = np.concatenate(leaves)
+    found, missing = np.concatenate(leaves), np.concatenate(holes)
     found = found[np.argsort(found[:, 0])]
-    return Tree(pages, found[:, 0], found[:, 1:3], np.concatenate(holes))
+    return Tree(pages, found[:, 0], found[:, 1:3], missing[:, 1:3], missing[:, 3:])
 
 
 def _fits(structure: Structure, level: Ints, taken: Mask) -> Mask:
