@@ -248,7 +248,8 @@ def test_the_gate_does_not_let_an_action_pass_on_a_placeholder(healthy, change):
     times = np.array([START_NS + 5_000_000_000, START_NS + 12_000_000_000])
     stop = Table(TABLES["recoveries"], {
         "t_ns": times, "t_sensor_ns": times, "t_log_ns": times, "topic": ["/bt"] * 2,
-        "name": ["Spin"] * 2, "status": ["running"] * 2, "goal": [""] * 2, "source": ["behavior_tree"] * 2,
+        "name": ["Spin"] * 2, "status": ["running"] * 2, "goal": [""] * 2,
+        "source": ["behavior_tree"] * 2,
     })  # fmt: skip
 
     def judged(bundle):
