@@ -12,6 +12,8 @@ UbiquityRobotics/fiducials, magazino/move_base_flex.
 
 from __future__ import annotations
 
+from slamreplay.messages.costmaps import COSTMAPS
+
 #: Type name ("package/msg/Name") to its fields, one per line.
 DEFINITIONS: dict[str, str] = {
     # Behaviour tree: Humble's layout, which has no `uid`; see LATER_DEFINITIONS.
@@ -110,6 +112,7 @@ DEFINITIONS: dict[str, str] = {
     # tf of ROS 1: the store of Noetic has neither name.
     "tf/msg/tfMessage": "geometry_msgs/TransformStamped[] transforms\n",
     "tf2_msgs/msg/TFMessage": "geometry_msgs/TransformStamped[] transforms\n",
+    **COSTMAPS,
 }
 
 #: Newer layouts of the same names; a log that has them says so in its own definitions.
