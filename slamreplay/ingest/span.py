@@ -49,7 +49,8 @@ def cut(
     """Tables and span between two times, given in seconds after the span's start.
 
     Of what holds until it is replaced (maps, static transforms, the localizer's last word) the
-    latest row before the start is kept.
+    latest row before the start is kept; of a costmap with windows the last whole grid and the
+    windows since.
 
     Raises:
         UsageError: nothing lies between.
@@ -63,7 +64,8 @@ def cut(
             f"nothing is left between --start {start_s or 0:g} and --end {end_s or 0:g}",
             hint=f"the log lasts {(span[1] - span[0]) / 1e9:.1f} s",
         )
-    return {name: _part(table, start, end) for name, table in tables.items()}, (start, end)
+    parts = {name: _part(table, start, end) for name, table in tables.items()}
+    return parts | _costmaps_part(tables, start, end), (start, end)
 
 
 def clock_between(clock: Clock, tables: Mapping[str, Table]) -> Clock:
@@ -86,6 +88,20 @@ def _part(table: Table, start: int, end: int) -> Table:
     if table.schema.name in _HOLDING:
         keep[_latest_before(table, start)] = True
     return table.take(keep)
+
+
+def _costmaps_part(tables: Mapping[str, Table], start: int, end: int) -> dict[str, Table]:
+    """Whole grids and windows of the costmaps that have windows before the start."""
+    if not (_rows(tables, "costmaps") and _rows(tables, "costmap_updates")):
+        return {}
+    grids, windows = tables["costmaps"], tables["costmap_updates"]
+    keep = [(t.t_ns >= start) & (t.t_ns <= end) for t in (grids, windows)]
+    for row in _latest_before(grids, start).tolist():
+        own = windows["grid_topic"] == grids["topic"][row]
+        if own.any():
+            keep[0][row] = True
+            keep[1] |= own & (windows.t_ns >= grids.t_ns[row]) & (windows.t_ns <= end)
+    return {"costmaps": grids.take(keep[0]), "costmap_updates": windows.take(keep[1])}
 
 
 def _latest_before(table: Table, start: int) -> NDArray[np.int64]:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from slamreplay.bundle.costmaps import Costmaps, whole_grid
 from slamreplay.bundle.odometry import odometry_track
 from slamreplay.bundle.tables import Table
 from slamreplay.bundle.track import PoseTrack
@@ -47,11 +48,8 @@ class Obstacles:
     ) -> None:
         self._belief = belief
         self._odometry = odometry_track(view)
-        costmaps = view.role("costmap")
-        self._costmaps = (
-            None if costmaps is None or not len(costmaps) else costmaps.sorted_by_time()
-        )
-        told = None if self._costmaps is None else inscribed_radius_m(self._costmaps)
+        self._costmaps = Costmaps.of(view)
+        told = None if self._costmaps is None else inscribed_radius_m(self._costmaps.whole)
         self.radius_m = footprint_radius_m if told is None else told
         self._tree: cKDTree | None = None
         self._walls = None if view.grid is None else _centres(view.grid, view.grid.occupied)
@@ -74,12 +72,10 @@ class Obstacles:
         return self._nearest(self._tree, pose, path_xy, 0.0)
 
     def _from_costmap(self, t_ns: int, path_xy: se2.Array) -> Clearance | None:
-        if self._costmaps is None:
+        costmap = None if self._costmaps is None else self._costmaps.at(t_ns)
+        if costmap is None or t_ns - costmap.t_ns > FRESH_NS:
             return None
-        row = int(np.searchsorted(self._costmaps.t_ns, t_ns, side="right")) - 1
-        if row < 0 or t_ns - self._costmaps.t_ns[row] > FRESH_NS:
-            return None
-        grid = costmap_grid(self._costmaps, row)
+        grid = costmap.grid
         points = _centres(grid, grid.cells >= LETHAL)
         believed = _latest(self._belief, t_ns)
         pose, turn = believed, 0.0
@@ -108,24 +104,13 @@ class Obstacles:
         )
 
 
-def costmap_grid(costmaps: Table, row: int) -> OccupancyGrid:
-    """One costmap as a grid."""
-    height, width = int(costmaps["height"][row]), int(costmaps["width"][row])
-    return OccupancyGrid(
-        costmaps["cells"][row].reshape(height, width).copy(),
-        float(costmaps["resolution_m"][row]),
-        np.array(costmaps["origin_xyyaw"][row]),
-        str(costmaps["frame_id"][row]),
-    )
-
-
 def inscribed_radius_m(costmaps: Table) -> float | None:
     """The robot's inscribed radius as the inflation layer drew it; None where it drew nothing."""
     from scipy.ndimage import distance_transform_edt
 
     radii = []
     for row in np.linspace(0, len(costmaps) - 1, min(5, len(costmaps))).astype(int):
-        grid = costmap_grid(costmaps, row)
+        grid = whole_grid(costmaps, row)
         lethal = grid.cells >= LETHAL
         ring = grid.cells == INSCRIBED
         if lethal.any() and ring.any():
