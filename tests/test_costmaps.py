@@ -1,4 +1,4 @@
-"""Costmaps that come as windows: composed, cut, and what does not fit told."""
+"""Costmaps and maps that come as windows: composed, versioned, cut, and what does not fit told."""
 
 import numpy as np
 import pytest
@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 from slamreplay.bundle.costmaps import Costmaps
 from slamreplay.bundle.schema import TABLES
 from slamreplay.bundle.tables import Table
+from slamreplay.ingest import map_versions
 from slamreplay.ingest.options import IngestOptions
 from slamreplay.ingest.pipeline import ingest
 
@@ -205,3 +206,45 @@ def table(name, rows):
     else:
         columns |= {"x": [r[1] for r in rows], "y": [r[2] for r in rows], "grid_topic": ["g"] * n}
     return Table(TABLES[name], columns)
+
+
+# --- maps ------------------------------------------------------------------------------------
+
+
+def test_windows_of_the_map_make_new_versions(drive, tmp_path):
+    drive.whole(1.0, [[0, 100], [-1, 0]], "/map", "map")
+    drive.window(2.0, 0, 1, [[100, 100]], "/map_updates", "map")
+    drive.window(3.0, 0, 1, [[-1, 0]], "/map_updates", "map")  # as it was at first
+    drive.window(4.0, 1, 1, [[5]], "/map_updates", "map")
+    drive.window(5.0, 1, 1, [[5, 5]], "/map_updates", "map")
+
+    bundle = drive.bundle(tmp_path)
+
+    table, maps = bundle.table("map_updates"), bundle.manifest.maps
+    assert table["topic"].tolist() == ["/map", *["/map_updates"] * 3]
+    named = [m.version for m in maps]
+    assert [named.index(v) for v in table["map_version"]] == [1, 0, 1, 2]
+    assert bundle.grid().cells.tolist() == [[0, 100], [-1, 5]]
+    assert len(bundle.table("costmap_updates")) == 0
+    reason = "windows that do not fit the last whole grid of /map"
+    assert losses(bundle)["lost", "/map_updates", reason] == 1
+
+
+def test_of_many_versions_those_are_kept_that_differ_most(drive, tmp_path, monkeypatch):
+    monkeypatch.setattr(map_versions, "MAX_VERSIONS", 4)
+    cells = np.full((4, 4), -1, dtype=np.int8)
+    for step in range(9):  # a cell a second, and six at once in the middle
+        cells.ravel()[: step + 1 + (6 if step > 4 else 0)] = 100 if step == 0 else 0
+        drive.whole(0.5 + step, cells, "/map", "map")
+
+    bundle = drive.bundle(tmp_path)
+
+    table = bundle.table("map_updates")
+    kept = [m.version for m in bundle.manifest.maps]
+    assert len(table) == 9
+    assert len(set(table["map_version"])) == 9
+    steps = [table["map_version"].tolist().index(v) for v in kept]
+    assert steps == [0, 2, 5, 8]
+    (left,) = [x for x in bundle.manifest.losses if x.what == "/map"]
+    assert (left.kind, left.count) == ("skipped", 9 - len(kept))
+    assert "differs by 2 cells at most" in left.reason
