@@ -8,7 +8,9 @@ from hypothesis import strategies as st
 from slamreplay.bundle.costmaps import Costmaps
 from slamreplay.bundle.schema import TABLES
 from slamreplay.bundle.tables import Table
+from slamreplay.cli.inspect import show
 from slamreplay.ingest import map_versions
+from slamreplay.ingest.audit import inspect
 from slamreplay.ingest.options import IngestOptions
 from slamreplay.ingest.pipeline import ingest
 
@@ -248,3 +250,29 @@ def test_of_many_versions_those_are_kept_that_differ_most(drive, tmp_path, monke
     (left,) = [x for x in bundle.manifest.losses if x.what == "/map"]
     assert (left.kind, left.count) == ("skipped", 9 - len(kept))
     assert "differs by 2 cells at most" in left.reason
+
+
+def test_a_part_of_a_log_has_the_maps_that_held_in_it(drive, tmp_path):
+    for t_s, cell in ((1.0, 0), (5.0, 100), (8.0, -1)):
+        drive.whole(t_s, [[0, cell]], "/map", "map")
+
+    bundle = drive.bundle(tmp_path, start_s=3.0, end_s=7.0)
+
+    first, second = bundle.manifest.maps
+    assert first.held_ns == [(EPOCH + 3 * SECOND, EPOCH + 5 * SECOND)]
+    assert second.held_ns == [(EPOCH + 5 * SECOND, EPOCH + 7 * SECOND)]
+    assert bundle.grid().cells.tolist() == [[0, 100]]
+    assert bundle.grid(first.version).cells.tolist() == [[0, 0]]
+    assert bundle.grid("sha256:none") is None
+    assert [m["held_ns"] for m in inspect(bundle)["maps"]] == [m.held_ns for m in (first, second)]
+
+
+def test_inspect_says_when_each_map_held(drive, tmp_path, capsys):
+    for t_s, cell in ((0.5, 0), (4.0, 100), (6.0, 0)):
+        drive.whole(t_s, [[0, cell]], "/map", "map")
+
+    show(inspect(drive.bundle(tmp_path)), as_json=False)
+
+    said = capsys.readouterr().out
+    assert "0.0 to 4.0, 6.0 to 9.9" in said
+    assert "4.0 to 6.0" in said

@@ -84,7 +84,7 @@ class Frames(_Strict):
 
 
 class MapVersion(_Strict):
-    """A map under maps/<folder>/, and where it came from."""
+    """A map under maps/<folder>/, where it came from, and when it held (pairs of ns)."""
 
     version: str
     folder: str
@@ -92,6 +92,7 @@ class MapVersion(_Strict):
     width: int
     height: int
     resolution_m: float
+    held_ns: list[tuple[int, int]] = []
 
 
 class TableEntry(_Strict):

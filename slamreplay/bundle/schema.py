@@ -236,7 +236,11 @@ _SCHEMAS = (
     _table(
         "map_updates",
         "from when on which map version held",
-        Column("map_version", "str", doc="hash of content and metadata; folder under maps/"),
+        Column(
+            "map_version",
+            "str",
+            doc="hash of content and metadata; folder under maps/, where that version was kept",
+        ),
         _FRAME,
     ),
 )

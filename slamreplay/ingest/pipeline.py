@@ -8,6 +8,7 @@ from pathlib import Path
 
 from slamreplay.bundle.atomic import check_target
 from slamreplay.bundle.manifest import Frames, Loss, Manifest, Role, Source
+from slamreplay.bundle.map_course import map_course
 from slamreplay.bundle.store import MANIFEST, write_bundle
 from slamreplay.bundle.tables import Table
 from slamreplay.bundle.view import Bundle
@@ -25,6 +26,7 @@ from slamreplay.ingest.roles import Choice
 from slamreplay.ingest.rows import TopicRows, read_rows
 from slamreplay.ingest.span import clock_between, cut, evidence_span
 from slamreplay.ingest.tables import build, without_prefix
+from slamreplay.maps.grid import OccupancyGrid
 
 
 def ingest(
@@ -97,7 +99,7 @@ def ingest(
         losses=_sorted(losses),
         tables={},
     )
-    write_bundle(target, manifest, tables, layers.grids)
+    write_bundle(target, manifest, tables, _held(layers.grids, tables, span))
     return Bundle.open(target)
 
 
@@ -107,6 +109,18 @@ def _survey(path: Path, frames: Frames) -> tuple[TopicRows, Source, list[Loss]]:
     digest = hashlib.sha256(content).hexdigest()
     source = Source(name=path.name, format="reference", bytes=len(content), sha256=digest)
     return rows, source, losses
+
+
+def _held(
+    grids: Mapping[str, OccupancyGrid], tables: Mapping[str, Table], span: tuple[int, int]
+) -> dict[str, OccupancyGrid]:
+    """The maps that held in the span, in the order in which they did so last."""
+    if len(grids) < 2:
+        return dict(grids)
+    source = {grid.version: name for name, grid in grids.items()}
+    course = map_course(tables["map_updates"], list(source), *span)
+    last = dict.fromkeys(h.version for h in reversed(course))
+    return {source[version]: grids[source[version]] for version in reversed(last)}
 
 
 def _texts(options: IngestOptions) -> dict[str, str]:

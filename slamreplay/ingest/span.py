@@ -14,7 +14,7 @@ from slamreplay.errors import LogError, UsageError
 from slamreplay.geometry.times import ns
 
 #: Tables whose latest row before the start still holds after it.
-_HOLDING = ("transforms", "poses", "initial_poses", "map_updates")
+_HOLDING = ("transforms", "poses", "initial_poses")
 
 
 def evidence_span(
@@ -48,9 +48,9 @@ def cut(
 ) -> tuple[dict[str, Table], tuple[int, int]]:
     """Tables and span between two times, given in seconds after the span's start.
 
-    Of what holds until it is replaced (maps, static transforms, the localizer's last word) the
-    latest row before the start is kept; of a costmap with windows the last whole grid and the
-    windows since.
+    Of what holds until it is replaced (static transforms, the localizer's last word) the latest row
+    before the start is kept; of map versions every row, for not every version has its map; of a
+    costmap with windows the last whole grid and the windows since.
 
     Raises:
         UsageError: nothing lies between.
@@ -85,6 +85,8 @@ def _part(table: Table, start: int, end: int) -> Table:
     keep = (t >= start) & (t <= end)
     if table.schema.name == "transforms":
         keep |= table["is_static"]
+    if table.schema.name == "map_updates":
+        keep |= t < start
     if table.schema.name in _HOLDING:
         keep[_latest_before(table, start)] = True
     return table.take(keep)

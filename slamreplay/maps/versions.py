@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import distance_transform_edt
+from scipy.ndimage import maximum_filter
 
 from slamreplay.geometry import se2
 from slamreplay.maps.grid import FREE_TO, OCCUPIED_FROM, OccupancyGrid
 
 #: A wall is still there if one of the other version is this near, m.
 NEAR_M = 0.25
-#: Versions of which so much of the walls is still there are of one place: half an aisle may be laid
-#: out anew. Of walls of an unrelated map less than a third lie this near to any other.
-SAME_SHARE = 0.6
+#: Versions of which no more of the faces than this stands otherwise are of one place. Of two floors
+#: that share their outer walls a third does, and a robot placed in the wrong one would be called
+#: lost; to judge two versions apart costs no more than the evidence across the switch.
+OTHERWISE = 0.2
 _KINDS: NDArray[np.uint8] = np.select(
     [np.arange(256) > 127, np.arange(256) >= OCCUPIED_FROM, np.arange(256) <= FREE_TO], [0, 1, 2], 3
 ).astype(np.uint8)
@@ -51,20 +52,37 @@ def _shift(old: OccupancyGrid, new: OccupancyGrid) -> NDArray[np.int64] | None:
 
 
 def same_place(old: OccupancyGrid, new: OccupancyGrid) -> bool:
-    """Whether a robot in the old map can be found in the new one.
+    """Whether a robot that drives by the old map can be looked for in the new one.
 
-    They are in one frame, and most walls of the old one are still there. What the new one has
-    beside them does not count: a map that is being drawn grows.
+    They are in one frame, nearly all faces of the old one's walls are still there, and hardly any
+    new one stands where the old one is free. What it was silent about does not count: a map that
+    is being drawn grows.
     """
     if old.frame_id != new.frame_id:
         return False
-    walls = np.argwhere(old.occupied)
-    if not len(walls):
-        return True
-    if not new.occupied.any():
-        return False
-    away_m = distance_transform_edt(~new.occupied) * new.resolution_m
-    cell = new.cell_of(old.centre_of(walls))
-    inside = new.inside(cell)
-    still = away_m[tuple(cell[inside].T)] <= NEAR_M
-    return bool(np.count_nonzero(still) >= SAME_SHARE * len(walls))
+    before, now = _faces(old), _faces(new)
+    gone = before[~_has_wall(new, old.centre_of(before))]
+    fresh = now[~_has_wall(old, new.centre_of(now))]
+    cell = old.cell_of(new.centre_of(fresh))
+    inside = cell[old.inside(cell)]
+    added = np.count_nonzero(old.free[tuple(inside.T)])
+    return bool(len(gone) + added <= OTHERWISE * (len(before) + added))
+
+
+def _faces(grid: OccupancyGrid) -> NDArray[np.int64]:
+    """(N, 2) wall cells beside free ones: thick walls count by what can be seen of them."""
+    return np.argwhere(grid.occupied & maximum_filter(grid.free, 3))
+
+
+def _has_wall(grid: OccupancyGrid, xy_m: se2.Array) -> NDArray[np.bool_]:
+    """(N,) which points (N, 2) have a wall within `NEAR_M` to both sides of them, rows and columns.
+
+    Outside of the grid none has.
+    """
+    found = np.zeros(len(xy_m), dtype=bool)
+    # A square filter takes a third of the time of a distance transform.
+    near = maximum_filter(grid.occupied, 2 * round(NEAR_M / grid.resolution_m) + 1)
+    cell = grid.cell_of(xy_m)
+    inside = grid.inside(cell)
+    found[inside] = near[tuple(cell[inside].T)]
+    return found
