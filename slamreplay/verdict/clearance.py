@@ -51,8 +51,8 @@ class Obstacles:
         self._costmaps = Costmaps.of(view)
         told = None if self._costmaps is None else inscribed_radius_m(self._costmaps.whole)
         self.radius_m = footprint_radius_m if told is None else told
-        self._tree: cKDTree | None = None
-        self._walls = None if view.grid is None else _centres(view.grid, view.grid.occupied)
+        self._view = view
+        self._of_map: tuple[str, cKDTree | None] = ("", None)
 
     def clearance(self, t_ns: int, path_xy: se2.Array = HERE) -> Clearance | None:
         """At a time on the bundle's clock; None where neither costmap nor map can tell.
@@ -62,14 +62,26 @@ class Obstacles:
             path_xy: (M, 2) places the robot is about to pass, in its base frame at that time.
         """
         found = self._from_costmap(t_ns, path_xy)
-        if found is not None or self._walls is None or not len(self._walls):
+        if found is not None:
             return found
         pose = _latest(self._belief, t_ns)
-        if pose is None:
+        walls = None if pose is None else self._walls_at(t_ns)
+        if pose is None or walls is None:
             return None
-        if self._tree is None:
-            self._tree = cKDTree(self._walls)
-        return self._nearest(self._tree, pose, path_xy, 0.0)
+        return self._nearest(walls, pose, path_xy, 0.0)
+
+    def _walls_at(self, t_ns: int) -> cKDTree | None:
+        """The walls of the map version that held at a time, None without any."""
+        course = self._view.map_course
+        held = [h for h in course if h.start_ns <= t_ns] or list(course[:1])
+        if not held:
+            return None
+        version = held[-1].version
+        if self._of_map[0] != version:
+            grid = self._view.grid_of(version)
+            walls = np.empty((0, 2)) if grid is None else _centres(grid, grid.occupied)
+            self._of_map = version, cKDTree(walls) if len(walls) else None
+        return self._of_map[1]
 
     def _from_costmap(self, t_ns: int, path_xy: se2.Array) -> Clearance | None:
         costmap = None if self._costmaps is None else self._costmaps.at(t_ns)
