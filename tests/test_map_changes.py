@@ -9,8 +9,11 @@ from rooms import SECOND, at, boxed, log_of_two_worlds, mapped_until, upstairs
 from slamreplay.bundle.belief import recorded_belief
 from slamreplay.bundle.track import PoseTrack
 from slamreplay.geometry import se2
-from slamreplay.hindsight.earlier import on_raster
+from slamreplay.hindsight.changed_beams import BeamsOnMap
+from slamreplay.hindsight.earlier import LaidOver, drawn_late, on_raster
+from slamreplay.hindsight.evidence import Lattice
 from slamreplay.hindsight.pipeline import hindsight
+from slamreplay.hindsight.standing import Standing
 from slamreplay.ingest.pipeline import ingest
 from slamreplay.maps.grid import OccupancyGrid
 from slamreplay.matching.field import working_map
@@ -122,6 +125,24 @@ def test_a_map_that_is_being_drawn_is_judged_as_far_as_it_is_drawn(box_at_30):
     assert len(changed) == 1
     assert 30.0 < changed[0][1] < changed[0][2] <= 60.2
     assert {s[0] for s in states(judgement)} == {"healthy", "map_changed"}
+
+
+def test_a_wall_that_a_mapper_was_late_to_draw_is_none_that_came():
+    """Four cells seen from the fifth bin on, in a map whose left half the log itself has drawn."""
+    where = Lattice((1, 4), 1, 4, 0.1, np.zeros(2), np.arange(10, dtype=np.int32))
+    holds = np.tile(np.arange(10) >= 5, (4, 1))
+    empty = np.zeros((4, 10), dtype=bool)
+    empty[[1, 3], :5] = True  # beams went through before
+    empty[0, 2] = True  # once, along the wall
+    slots = np.arange(4, dtype=np.int32)[None]
+    new = Standing(slots, holds, holds, empty, np.full(4, 2.5), np.zeros(4))
+    fresh = np.array([[True, True, False, False]])
+    laid = BeamsOnMap(*(np.zeros((10, 1), dtype=t) for t in (np.int8, np.int32, bool, np.float32)))
+    working = working_map(OccupancyGrid(np.full((1, 4), 100, np.int8), 0.1, np.zeros(3)))
+
+    late = drawn_late(where, LaidOver(laid, laid.is_sure, working, fresh), new)
+
+    assert late.tolist() == [True, False, False, False]
 
 
 def test_each_floor_is_judged_in_its_own_map():

@@ -18,10 +18,14 @@ from slamreplay.bundle.view import BundleView
 from slamreplay.geometry import se2
 from slamreplay.hindsight.beams import Beams
 from slamreplay.hindsight.changed_beams import BEYOND_M, NEARER, BeamsOnMap, on_map
+from slamreplay.hindsight.evidence import Lattice
+from slamreplay.hindsight.standing import Standing
 from slamreplay.maps.grid import OCCUPIED_FROM, OccupancyGrid
 from slamreplay.matching.field import WorkingMap
 
 _BLOCK_CELLS = 500_000
+#: Bins of time in which a cell may be seen empty by noise of the poses.
+_BY_NOISE = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,10 +35,12 @@ class Earlier:
     Attributes:
         spans: times [start_ns, end_ns) over which it held.
         grid: reads it; many of them at once would fill the memory.
+        is_first: no other version held before it.
     """
 
     spans: tuple[tuple[int, int], ...]
     grid: Callable[[], OccupancyGrid | None]
+    is_first: bool = False
 
     def rows(self, t_ns: NDArray[np.int64]) -> NDArray[np.int64]:
         """Indices of the times (N,) at which it held."""
@@ -49,9 +55,9 @@ def earlier_versions(view: BundleView) -> tuple[Earlier, ...]:
     spans: dict[str, list[tuple[int, int]]] = {}
     for held in view.map_course:
         spans.setdefault(held.version, []).append((held.start_ns, held.end_ns))
-    newest = view.map_course[-1].version if view.map_course else ""
+    first, newest = (view.map_course[k].version if view.map_course else "" for k in (0, -1))
     return tuple(
-        Earlier(tuple(when), partial(view.grid_of, version))
+        Earlier(tuple(when), partial(view.grid_of, version), version == first)
         for version, when in spans.items()
         if version != newest
     )
@@ -100,11 +106,13 @@ class LaidOver:
         beams: what each says.
         near: (N, B) beams that end before their wall, but so near to another that it explains them.
         drawn: the newest map with the walls of every version.
+        fresh: (H, W) cells at walls of the newest map that the first version did not know.
     """
 
     beams: BeamsOnMap
     near: NDArray[np.bool_]
     drawn: WorkingMap
+    fresh: NDArray[np.bool_]
 
 
 def laid_over(
@@ -120,6 +128,7 @@ def laid_over(
     """
     laid = on_map(working, beams, poses)
     near, walls = _near_a_wall(working, laid), working.walls
+    fresh = np.zeros_like(walls)
     for version in earlier:
         rows = version.rows(beams.t_ns)
         grid = version.grid() if len(rows) else None
@@ -131,7 +140,24 @@ def laid_over(
         laid.says[rows], laid.where[rows] = part.says, part.where
         laid.is_sure[rows], laid.wall_m[rows] = part.is_sure, part.wall_m
         walls = walls | old.walls
-    return LaidOver(laid, near, replace(working, walls=walls))
+        if version.is_first:
+            fresh = old.unknown & near_walls(working)
+    return LaidOver(laid, near, replace(working, walls=walls), fresh)
+
+
+def drawn_late(where: Lattice, over: LaidOver, new: Standing) -> NDArray[np.bool_]:
+    """(C,) cells of something new that stood there all along, and that a mapper was late to draw.
+
+    A mapper calls the ground before a far wall free and draws the wall itself with the next
+    version. That is no change where the log's own scans have drawn both: the cell was not known
+    when the log began, it was never seen empty, and the newest map has the wall.
+    """
+    slot = np.flatnonzero(new.slots.ravel() >= 0)
+    late = np.zeros(len(new.holds), dtype=bool)
+    late[new.slots.ravel()[slot]] = where.coarse(over.fresh).ravel()[slot]
+    before = np.cumsum(new.holds, axis=1) == 0
+    seen_empty = np.count_nonzero(new.empty & before, axis=1)
+    return late & (seen_empty <= _BY_NOISE)
 
 
 def _near_a_wall(working: WorkingMap, laid: BeamsOnMap) -> NDArray[np.bool_]:
