@@ -1,6 +1,7 @@
 """A map that changes inside the log: each moment is judged against the version that held then."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,13 +11,15 @@ from slamreplay.bundle.belief import recorded_belief
 from slamreplay.bundle.track import PoseTrack
 from slamreplay.geometry import se2
 from slamreplay.hindsight.changed_beams import BeamsOnMap
-from slamreplay.hindsight.earlier import LaidOver, drawn_late, on_raster
+from slamreplay.hindsight.earlier import LaidOver, on_raster
 from slamreplay.hindsight.evidence import Lattice
+from slamreplay.hindsight.gone import Gone
+from slamreplay.hindsight.mapper import drawn_late, drawn_wrongly
 from slamreplay.hindsight.pipeline import hindsight
 from slamreplay.hindsight.standing import Standing
 from slamreplay.ingest.pipeline import ingest
 from slamreplay.maps.grid import OccupancyGrid
-from slamreplay.matching.field import working_map
+from slamreplay.matching.field import WorkingMap, working_map
 from slamreplay.postmortem import postmortem
 from slamreplay.report.writer import write_report
 from slamreplay.simulate.recording import record
@@ -127,22 +130,27 @@ def test_a_map_that_is_being_drawn_is_judged_as_far_as_it_is_drawn(box_at_30):
     assert {s[0] for s in states(judgement)} == {"healthy", "map_changed"}
 
 
-def test_a_wall_that_a_mapper_was_late_to_draw_is_none_that_came():
-    """Four cells seen from the fifth bin on, in a map whose left half the log itself has drawn."""
+def test_what_a_mapper_draws_late_or_wrongly_is_no_change():
+    """Four cells that differ from the fifth bin on; the log itself has drawn the first two."""
     where = Lattice((1, 4), 1, 4, 0.1, np.zeros(2), np.arange(10, dtype=np.int32))
     holds = np.tile(np.arange(10) >= 5, (4, 1))
-    empty = np.zeros((4, 10), dtype=bool)
-    empty[[1, 3], :5] = True  # beams went through before
-    empty[0, 2] = True  # once, along the wall
-    slots = np.arange(4, dtype=np.int32)[None]
-    new = Standing(slots, holds, holds, empty, np.full(4, 2.5), np.zeros(4))
+    other = np.zeros((4, 10), dtype=bool)
+    other[[1, 3], :5] = True  # before it was otherwise
+    other[0, 2] = True  # but here only once, by noise
+    slots, none_s = np.arange(4, dtype=np.int32)[None], np.zeros(4)
     fresh = np.array([[True, True, False, False]])
     laid = BeamsOnMap(*(np.zeros((10, 1), dtype=t) for t in (np.int8, np.int32, bool, np.float32)))
-    working = working_map(OccupancyGrid(np.full((1, 4), 100, np.int8), 0.1, np.zeros(3)))
+    walls = WorkingMap(~np.zeros((1, 4), bool), fresh, 0.1, np.zeros(2), np.zeros(3))
+    no_walls = replace(walls, walls=~walls.walls)
+    over = LaidOver(laid, laid.is_sure, walls, fresh, fresh)
+    new = Standing(slots, holds, holds, other, none_s, none_s)
+    away = Gone(slots, holds, holds, other, none_s, none_s)
 
-    late = drawn_late(where, LaidOver(laid, laid.is_sure, working, fresh), new)
-
-    assert late.tolist() == [True, False, False, False]
+    assert drawn_late(where, walls, over, new).tolist() == [True, False, False, False]
+    assert drawn_wrongly(where, no_walls, over, away).tolist() == [True, False, False, False]
+    # What the newest map still says is contradicted to this day.
+    assert not drawn_late(where, no_walls, over, new).any()
+    assert not drawn_wrongly(where, walls, over, away).any()
 
 
 def test_each_floor_is_judged_in_its_own_map():

@@ -13,11 +13,12 @@ from slamreplay.geometry import se2
 from slamreplay.hindsight.beams import HIT, INVALID, MISS, Beams
 from slamreplay.hindsight.changed_beams import BEYOND, BEYOND_M, NEARER, SILENT, BeamsOnMap
 from slamreplay.hindsight.correction import Edits, corrected, last_state
-from slamreplay.hindsight.earlier import Earlier, drawn_late, laid_over, near_walls
+from slamreplay.hindsight.earlier import Earlier, laid_over, near_walls
 from slamreplay.hindsight.emptied import empty_since, went_with_it
 from slamreplay.hindsight.evidence import Lattice, end_cells, lattice, passes
 from slamreplay.hindsight.freshness import freshness_of
 from slamreplay.hindsight.gone import gone
+from slamreplay.hindsight.mapper import drawn_late, drawn_wrongly
 from slamreplay.hindsight.reach import is_lossy, proven_reach_m
 from slamreplay.hindsight.regions import Contradictions, changed_regions
 from slamreplay.hindsight.standing import asked_cells, standing
@@ -88,9 +89,14 @@ def _look(
     ended = (ends[ends >= 0], bins[ends >= 0])
     met = (ends >= 0) & ~veil[beams.kind == HIT]  # a veil fills no place, but hides a wall
     new = standing(where, solid, slots, passed.through, (ends[met], bins[met]))
-    if earlier:
-        new = replace(new, holds=new.holds & ~drawn_late(where, over, new)[:, None])
     away = gone(where, laid, ended)
+    if earlier:
+        late, wrong = (
+            drawn_late(where, working, over, new),
+            drawn_wrongly(where, working, over, away),
+        )
+        new = replace(new, holds=new.holds & ~late[:, None])
+        away = replace(away, holds=away.holds & ~wrong[:, None])
     is_new = _at(where, laid, NEARER, new.slots, new.holds)
     is_gone = _at(where, laid, BEYOND, away.slots, away.holds)
 

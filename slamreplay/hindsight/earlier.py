@@ -18,14 +18,13 @@ from slamreplay.bundle.view import BundleView
 from slamreplay.geometry import se2
 from slamreplay.hindsight.beams import Beams
 from slamreplay.hindsight.changed_beams import BEYOND_M, NEARER, BeamsOnMap, on_map
-from slamreplay.hindsight.evidence import Lattice
-from slamreplay.hindsight.standing import Standing
 from slamreplay.maps.grid import OCCUPIED_FROM, OccupancyGrid
 from slamreplay.matching.field import WorkingMap
 
 _BLOCK_CELLS = 500_000
-#: Bins of time in which a cell may be seen empty by noise of the poses.
-_BY_NOISE = 3
+#: So many versions before the newest come from a mapper that runs; nobody loads as many by hand.
+#: What the first of several versions did not know, the log's own mapper has drawn in any case.
+MAPPER_VERSIONS = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,13 +105,15 @@ class LaidOver:
         beams: what each says.
         near: (N, B) beams that end before their wall, but so near to another that it explains them.
         drawn: the newest map with the walls of every version.
-        fresh: (H, W) cells at walls of the newest map that the first version did not know.
+        own_free: (H, W) cells that were called free, if at all, by the log's own mapper.
+        own_wall: (H, W) cells that were called a wall, if at all, by the log's own mapper.
     """
 
     beams: BeamsOnMap
     near: NDArray[np.bool_]
     drawn: WorkingMap
-    fresh: NDArray[np.bool_]
+    own_free: NDArray[np.bool_]
+    own_wall: NDArray[np.bool_]
 
 
 def laid_over(
@@ -128,7 +129,7 @@ def laid_over(
     """
     laid = on_map(working, beams, poses)
     near, walls = _near_a_wall(working, laid), working.walls
-    fresh = np.zeros_like(walls)
+    own_free = own_wall = np.zeros_like(walls)
     for version in earlier:
         rows = version.rows(beams.t_ns)
         grid = version.grid() if len(rows) else None
@@ -140,24 +141,11 @@ def laid_over(
         laid.says[rows], laid.where[rows] = part.says, part.where
         laid.is_sure[rows], laid.wall_m[rows] = part.is_sure, part.wall_m
         walls = walls | old.walls
-        if version.is_first:
-            fresh = old.unknown & near_walls(working)
-    return LaidOver(laid, near, replace(working, walls=walls), fresh)
-
-
-def drawn_late(where: Lattice, over: LaidOver, new: Standing) -> NDArray[np.bool_]:
-    """(C,) cells of something new that stood there all along, and that a mapper was late to draw.
-
-    A mapper calls the ground before a far wall free and draws the wall itself with the next
-    version. That is no change where the log's own scans have drawn both: the cell was not known
-    when the log began, it was never seen empty, and the newest map has the wall.
-    """
-    slot = np.flatnonzero(new.slots.ravel() >= 0)
-    late = np.zeros(len(new.holds), dtype=bool)
-    late[new.slots.ravel()[slot]] = where.coarse(over.fresh).ravel()[slot]
-    before = np.cumsum(new.holds, axis=1) == 0
-    seen_empty = np.count_nonzero(new.empty & before, axis=1)
-    return late & (seen_empty <= _BY_NOISE)
+        if version.is_first and len(earlier) >= MAPPER_VERSIONS:
+            own_free, own_wall = old.unknown | old.walls, ~old.walls
+        elif version.is_first:
+            own_free = own_wall = old.unknown
+    return LaidOver(laid, near, replace(working, walls=walls), own_free, own_wall)
 
 
 def _near_a_wall(working: WorkingMap, laid: BeamsOnMap) -> NDArray[np.bool_]:
@@ -167,5 +155,7 @@ def _near_a_wall(working: WorkingMap, laid: BeamsOnMap) -> NDArray[np.bool_]:
 
 def near_walls(working: WorkingMap) -> NDArray[np.bool_]:
     """(H, W) cells so near to a wall that it explains what ends there."""
+    if not working.walls.any():  # a mapper's first map may have none
+        return np.zeros_like(working.walls)
     apart_m = distance_transform_edt(~working.walls) * working.resolution_m
     return np.asarray(apart_m <= BEYOND_M)
