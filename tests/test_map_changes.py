@@ -185,6 +185,19 @@ def test_a_floor_whose_map_is_wrong_leaves_the_other_one_judged():
     assert [(f.start_ns, f.end_ns) for f in wrong] == [(at(40.0), at(80.0))]
 
 
+def test_a_map_that_only_flickers_up_is_passed_over_and_told():
+    maps = [(at(-5.0), room_grid()), (at(12.0), upstairs()), (at(15.0), room_grid())]
+    bundle = with_maps(synthetic_bundle(seconds=30.0), maps)
+
+    found, judgement = judged(bundle)
+
+    assert states(judgement) == [("healthy", 0.0, 30.0)]
+    assert not found.parts
+    (told,) = [f for f in judgement.findings if f.id == "SR-MAP-003"]
+    assert told.severity == "warning"
+    assert "1 of another place held for less than 10 s" in told.message
+
+
 def test_a_belief_says_nothing_in_the_frame_of_another_map():
     bundle = log_of_two_worlds(80.0, 40.0, room_grid(), upstairs())
     shifted = synthetic_bundle(seconds=80.0, belief_offset_xyyaw=(3.0, 0.0, 0.0), offset_from_s=40)

@@ -101,8 +101,8 @@ FINDINGS: dict[str, Explanation] = {
         "than a fifth of the faces of their walls stands otherwise by over 0.25 m, unmapped space "
         "apart; where that is not so each stretch of 10 s or more is judged in its own map. "
         "Changed cells are drawn in the last map.",
-        "A mapper that closes a loop bends its map: the older version counts as another place then. "
-        "What it drew late or in vain is no change where nothing was seen to come or go.",
+        "A mapper that closes a loop bends its map: the older version counts as another place "
+        "then. What it drew late or in vain is no change where nothing was seen to come or go.",
     ),
     "SR-MAP-FRAME": Explanation(
         "The map's frame is shifted",

@@ -182,6 +182,8 @@ class BundleView:
     @cached_property
     def map_stretches(self) -> tuple[MapStretch, ...]:
         """The parts of the log over which the maps were of one place; none without a map."""
+        if self.stretch is not None:
+            return (self.stretch,)
         return self.bundle.map_stretches(self.map_course)
 
     @cached_property

@@ -50,11 +50,12 @@ class Earlier:
 
 
 def earlier_versions(view: BundleView) -> tuple[Earlier, ...]:
-    """The versions before the newest one that held in the view, by their first moment."""
+    """The versions before the newest one of a view of one place, by their first moment."""
+    course = view.map_stretches[-1].held if view.map_stretches else ()
     spans: dict[str, list[tuple[int, int]]] = {}
-    for held in view.map_course:
+    for held in course:
         spans.setdefault(held.version, []).append((held.start_ns, held.end_ns))
-    first, newest = (view.map_course[k].version if view.map_course else "" for k in (0, -1))
+    first, newest = (course[k].version if course else "" for k in (0, -1))
     return tuple(
         Earlier(tuple(when), partial(view.grid_of, version), version == first)
         for version, when in spans.items()

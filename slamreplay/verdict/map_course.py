@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from slamreplay.bundle.findings import Finding
+from slamreplay.bundle.findings import Finding, Severity
+from slamreplay.bundle.map_course import SHORTEST_NS
 from slamreplay.bundle.view import BundleView
 from slamreplay.geometry.times import NS_PER_S
 
@@ -25,4 +26,12 @@ def map_course_findings(view: BundleView) -> tuple[Finding, ...]:
             f"; at {cuts} one came that shows another place, or this one much otherwise: "
             "each stretch is judged in its own"
         )
-    return (Finding("SR-MAP-003", "info", text, course[0].start_ns, course[-1].end_ns, n=count),)
+    judged = {held.version for stretch in stretches for held in stretch.held}
+    passing = count - len(judged)
+    if passing:
+        text += (
+            f"; {passing} of another place held for less than {SHORTEST_NS / NS_PER_S:.0f} s at a "
+            "time: passed over, as if the one before had held on (do two nodes publish the map?)"
+        )
+    severity: Severity = "warning" if passing else "info"
+    return (Finding("SR-MAP-003", severity, text, course[0].start_ns, course[-1].end_ns, n=count),)
