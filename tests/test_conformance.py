@@ -38,6 +38,15 @@ POSED = {"pose": POSE, "covariance": COV36}
 LOG = {"level": 4, "name": "n", "msg": "text"}
 GRID = {"resolution": 0.5, "width": 2, "height": 1, "origin": POSE}
 COSTS = {"resolution": 0.5, "size_x": 2, "size_y": 1, "origin": POSE}
+VOXELS = {
+    "data": [0x00040004, 0x0000FFFB, 0x0000FFFF, 0xFFF80007],  # marked, one known, none, above it
+    "origin": XYZ,
+    "resolutions": {"x": 0.5, "y": 0.5, "z": 0.2},
+    "size_x": 4,
+    "size_y": 1,
+    "size_z": 3,
+}
+SEEN_FROM_ABOVE = {"cells": [100, 0, -1, -1], "width": 4, "origin_xyyaw": [1, 2, 0]}
 FIELDS = [{"name": n, "offset": 4 * k, "datatype": 7} for k, n in enumerate("xyz")]
 CLOUD = {"height": 1, "width": 1, "fields": FIELDS, "is_bigendian": False, "point_step": 12}
 XYZ_BYTES = list(np.array([1, 2, 3], dtype="<f4").tobytes())
@@ -296,6 +305,18 @@ DECODER_LINES = {
         {"cells": [100, -1], "height": 1, "resolution_m": 0.5},
         T,
     ),
+    "map_msgs/msg/OccupancyGridUpdate": (
+        {"header": HEADER, "x": 3, "y": 4, "width": 2, "height": 1, "data": [-1, 100]},
+        {"frame_id": "f", "x": 3, "y": 4, "width": 2, "height": 1, "cells": [-1, 100]},
+        T,
+    ),
+    "nav2_msgs/msg/CostmapUpdate": (
+        {"header": HEADER, "x": 3, "y": 4, "size_x": 1, "size_y": 2, "data": [253, -1]},
+        {"x": 3, "y": 4, "width": 1, "height": 2, "cells": [99, -1]},
+        T,
+    ),
+    "costmap_2d/msg/VoxelGrid": ({"header": HEADER, **VOXELS}, SEEN_FROM_ABOVE, T),
+    "nav2_msgs/msg/VoxelGrid": ({"header": HEADER, **VOXELS}, SEEN_FROM_ABOVE, T),
     "nav_msgs/msg/Path": (
         {"header": HEADER, "poses": [{"header": HEADER, "pose": POSE}]},
         {"xyyaw": [1, 2, YAW], "frame_id": "f"},

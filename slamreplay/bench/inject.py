@@ -138,9 +138,7 @@ def _whole(view: BundleView, name: str) -> Table:
 
 
 def _view_of(view: BundleView, tables: Mapping[str, Table], manifest: Manifest) -> BundleView:
-    grid = view.bundle.grid()
-    grids = {} if grid is None else {grid.version: grid}
-    bundle = Bundle(manifest, tables, grids)
+    bundle = Bundle(manifest, tables, view.bundle.grids())
     return BundleView(bundle, replaced_grid=view.replaced_grid, settings=view.settings)
 
 

@@ -25,7 +25,5 @@ def bundle_of(incident: Incident) -> tuple[Bundle, Truth]:
         write_log(log, lambda messages: records(incident.recording, messages))
         on_disk = ingest([log], Path(folder) / "bundle")
         tables = {name: on_disk.table(name) for name in TABLES}
-        grid = on_disk.grid()
-        grids = {} if grid is None else {on_disk.manifest.maps[-1].version: grid}
-        bundle = Bundle(on_disk.manifest, tables, grids)
+        bundle = Bundle(on_disk.manifest, tables, on_disk.grids())
     return bundle, truth_of(incident, bundle)

@@ -92,6 +92,18 @@ FINDINGS: dict[str, Explanation] = {
         "No occupancy grid topic and no --map.",
         "A map that was recorded before the log was cut: give it with --map.",
     ),
+    "SR-MAP-003": Explanation(
+        "The map was exchanged during the log",
+        "Did more than one version of the map hold, one after the other?",
+        "Versions of the map topic (whole grids, and windows laid over them) by their time. The "
+        "robot is placed in the last version of a place, each moment's beams are compared with the "
+        "version that held then. Versions are of one place if they share the frame and no more "
+        "than a fifth of the faces of their walls stands otherwise by over 0.25 m, unmapped space "
+        "apart; where that is not so each stretch of 10 s or more is judged in its own map. "
+        "Changed cells are drawn in the last map.",
+        "A mapper that closes a loop bends its map: the older version counts as another place "
+        "then. What it drew late or in vain is no change where nothing was seen to come or go.",
+    ),
     "SR-MAP-FRAME": Explanation(
         "The map's frame is shifted",
         "Is the belief off by one constant transform over the whole log?",

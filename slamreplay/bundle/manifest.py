@@ -95,7 +95,7 @@ class Frames(_Strict):
 
 
 class MapVersion(_Strict):
-    """A map under maps/<folder>/, and where it came from."""
+    """A map under maps/<folder>/, where it came from, and when it held (pairs of ns)."""
 
     version: str
     folder: str
@@ -103,6 +103,7 @@ class MapVersion(_Strict):
     width: int
     height: int
     resolution_m: float
+    held_ns: list[tuple[int, int]] = []
 
 
 class TableEntry(_Strict):

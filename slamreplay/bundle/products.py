@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slamreplay.bundle.freshness import Freshness
+from slamreplay.bundle.map_course import MapStretch
 from slamreplay.bundle.track import PoseTrack
 from slamreplay.geometry import se2
 
@@ -28,6 +29,7 @@ class ChangedRegion:
         kind: appeared (mapped free, stands there), removed (mapped wall, gone) or moved.
         bbox_m: x_min, y_min, x_max, y_max in the map frame; of a moved region the new place.
         from_bbox_m: the old place of a moved region.
+        map_version: of the map it is drawn in; None is the map at the log's end.
     """
 
     kind: Literal["appeared", "removed", "moved"]
@@ -38,11 +40,15 @@ class ChangedRegion:
     views: int
     confidence: float
     from_bbox_m: tuple[float, float, float, float] | None = None
+    map_version: str | None = None
 
 
 @dataclass(frozen=True, eq=False)
 class Changes:
     """Changed cells and beams.
+
+    Beams are compared with the map version of their time. Cells are those of the version at the
+    log's end; what a later version has drawn already is not among them.
 
     Attributes:
         appeared: (H, W) cells mapped free or unknown where something stands.
@@ -88,6 +94,8 @@ class Hindsight:
             was not asked. The margin is about the whole log, this about one moment.
         scale: how many times larger than the place the map is drawn; None where it is to scale, or
             where no scale fits.
+        parts: what it was joined from, where the maps of the log were of several places: two
+            stretches or more.
     """
 
     track: PoseTrack
@@ -99,3 +107,12 @@ class Hindsight:
     joined: Mapping[str, int] = field(default_factory=lambda: MappingProxyType({}))
     lead: se2.Array = field(default_factory=lambda: np.empty(0))
     scale: float | None = None
+    parts: tuple[Part, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """Hindsight of one stretch of a log, in the maps of that stretch."""
+
+    stretch: MapStretch
+    hindsight: Hindsight

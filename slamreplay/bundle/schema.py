@@ -202,6 +202,17 @@ _SCHEMAS = (
         Column("cells", "list_i8", doc="row-major from the lower left: 0 to 100, -1 unknown"),
     ),
     _table(
+        "costmap_updates",
+        "windows of cost grids that changed; rows of `costmaps` are whole grids",
+        _FRAME,
+        Column("grid_topic", "str", doc="topic of the grid it changes: of its last whole one"),
+        Column("x", "int32", unit="cells", doc="that grid's column of the window's lower left"),
+        Column("y", "int32", unit="cells", doc="that grid's row of the window's lower left"),
+        Column("width", "int32", unit="cells", doc="columns"),
+        Column("height", "int32", unit="cells", doc="rows"),
+        Column("cells", "list_i8", doc="row-major from the lower left: 0 to 100, -1 unknown"),
+    ),
+    _table(
         "plans",
         "paths that were planned",
         _FRAME,
@@ -306,7 +317,11 @@ _SCHEMAS = (
     _table(
         "map_updates",
         "from when on which map version held",
-        Column("map_version", "str", doc="hash of content and metadata; folder under maps/"),
+        Column(
+            "map_version",
+            "str",
+            doc="hash of content and metadata; folder under maps/, where that version was kept",
+        ),
         _FRAME,
     ),
 )

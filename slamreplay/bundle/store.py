@@ -18,6 +18,7 @@ from pydantic import ValidationError
 
 from slamreplay.bundle.atomic import atomic_folder
 from slamreplay.bundle.manifest import Manifest, MapVersion, TableEntry
+from slamreplay.bundle.map_course import map_course
 from slamreplay.bundle.schema import FORMAT_VERSION, TABLES, TableSchema
 from slamreplay.bundle.tables import Table
 from slamreplay.errors import BundleError
@@ -65,7 +66,7 @@ def write_bundle(
         target: the bundle's folder; an equal bundle already there is kept as it is.
         manifest: everything but `tables`, `maps` and `bundle_id`, which are computed here.
         tables: by name; those without rows are written too, so that every bundle has all.
-        grids: source description to map.
+        grids: source description to map, the one that holds at the end last.
 
     Raises:
         OutputError: the folder is somebody else's or cannot be written.
@@ -84,6 +85,13 @@ def write_bundle(
                 sha256=_sha256(file),
             )
         maps = []
+        updates = tables["map_updates"].groups() if "map_updates" in tables else ()
+        course = map_course(
+            Table.concat(TABLES["map_updates"], updates),
+            [grid.version for grid in grids.values()],
+            manifest.start_ns,
+            manifest.end_ns,
+        )
         for source, grid in grids.items():
             folder = grid.version.removeprefix("sha256:")[:16]
             (work / "maps" / folder).mkdir(parents=True, exist_ok=True)
@@ -98,6 +106,7 @@ def write_bundle(
                     width=width,
                     height=height,
                     resolution_m=grid.resolution_m,
+                    held_ns=[(h.start_ns, h.end_ns) for h in course if h.version == grid.version],
                 )
             )
         manifest = manifest.model_copy(update={"tables": entries, "maps": maps, "bundle_id": ""})

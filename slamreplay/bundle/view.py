@@ -11,6 +11,7 @@ from types import MappingProxyType
 import numpy as np
 
 from slamreplay.bundle.manifest import Manifest
+from slamreplay.bundle.map_course import Held, MapStretch, map_course, map_stretches
 from slamreplay.bundle.placeholders import without_placeholders
 from slamreplay.bundle.schema import JUDGING_KINDS, SENSED_KINDS, TABLES
 from slamreplay.bundle.store import read_grid, read_manifest, read_table
@@ -54,6 +55,7 @@ class Bundle:
         self._tables = dict(tables)
         self._evidence: dict[str, Table] = {}
         self._grids = dict(grids)
+        self._stretches: dict[tuple[Held, ...], tuple[MapStretch, ...]] = {}
 
     @classmethod
     def open(cls, path: Path) -> Bundle:
@@ -82,14 +84,39 @@ class Bundle:
             self._evidence[name] = without_placeholders(self.table(name), map_frame)
         return self._evidence[name]
 
-    def grid(self) -> OccupancyGrid | None:
-        """The active map: the newest version the manifest lists, or None."""
-        if not self.manifest.maps:
+    @property
+    def map_versions(self) -> tuple[str, ...]:
+        """The map versions that can be had, in the order in which they held last."""
+        listed = tuple(entry.version for entry in self.manifest.maps)
+        return listed if self.path is not None else tuple(v for v in listed if v in self._grids)
+
+    def grid(self, version: str | None = None) -> OccupancyGrid | None:
+        """A map by its version; by default the newest. None where it is not there.
+
+        The newest stays in memory; older ones of a bundle on disk are read each time.
+        """
+        listed = {entry.version: entry for entry in self.manifest.maps}
+        newest = self.manifest.maps[-1].version if listed else None
+        version = newest if version is None else version
+        if version is None or version not in listed:
             return None
-        entry = self.manifest.maps[-1]
-        if entry.version not in self._grids and self.path is not None:
-            self._grids[entry.version] = read_grid(self.path, entry)
-        return self._grids[entry.version]
+        if version in self._grids or self.path is None:
+            return self._grids.get(version)
+        grid = read_grid(self.path, listed[version])
+        if version == newest:
+            self._grids[version] = grid
+        return grid
+
+    def map_stretches(self, course: tuple[Held, ...]) -> tuple[MapStretch, ...]:
+        """A course of this bundle's maps, cut wherever the place changes; worked out once."""
+        if course not in self._stretches:
+            self._stretches[course] = map_stretches(course, self.grid)
+        return self._stretches[course]
+
+    def grids(self) -> dict[str, OccupancyGrid]:
+        """Every map by its version, the newest last."""
+        found = {version: self.grid(version) for version in self.map_versions}
+        return {version: grid for version, grid in found.items() if grid is not None}
 
     def view(self, hold_out: Collection[str] = ()) -> BundleView:
         """The evidence as it was recorded, without references of the kinds that are held out.
@@ -111,6 +138,7 @@ class BundleView:
         replaced_grid: a map a perturbation has exchanged.
         settings: estimator settings a perturbation has changed, by name.
         held_out: kinds of references that are left out beside those that only judge.
+        stretch: the part of the log that is looked at; None is all of it.
     """
 
     bundle: Bundle
@@ -118,6 +146,7 @@ class BundleView:
     replaced_grid: OccupancyGrid | None = None
     settings: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
     held_out: frozenset[str] = frozenset()
+    stretch: MapStretch | None = None
 
     @property
     def manifest(self) -> Manifest:
@@ -151,10 +180,51 @@ class BundleView:
         table = self.table(ROLE_TABLES[role])
         return table.take(table["topic"] == topic)
 
+    @property
+    def span(self) -> tuple[int, int]:
+        """First and last moment that is looked at, ns."""
+        if self.stretch is not None:
+            return self.stretch.start_ns, self.stretch.end_ns
+        return self.manifest.start_ns, self.manifest.end_ns
+
+    @cached_property
+    def map_course(self) -> tuple[Held, ...]:
+        """The map versions that held, from the first to the last moment of the span."""
+        if self.stretch is not None:
+            return self.stretch.held
+        if self.replaced_grid is not None:
+            return (Held(self.replaced_grid.version, *self.span),)
+        return map_course(self.table("map_updates"), self.bundle.map_versions, *self.span)
+
+    @cached_property
+    def map_stretches(self) -> tuple[MapStretch, ...]:
+        """The parts of the log over which the maps were of one place; none without a map."""
+        if self.stretch is not None:
+            return (self.stretch,)
+        return self.bundle.map_stretches(self.map_course)
+
     @cached_property
     def grid(self) -> OccupancyGrid | None:
-        """The active map."""
-        return self.bundle.grid() if self.replaced_grid is None else self.replaced_grid
+        """The map: the version at the end, in which places and changes are told."""
+        stretches = self.map_stretches
+        return self.grid_of(stretches[-1].version) if stretches else None
+
+    def grid_of(self, version: str) -> OccupancyGrid | None:
+        """A map by its version, None where it is not there."""
+        if self.replaced_grid is not None and self.replaced_grid.version == version:
+            return self.replaced_grid
+        return self.bundle.grid(version)
+
+    def within(self, stretch: MapStretch) -> BundleView:
+        """A view of one stretch: its scans and sightings only; the rest is looked up by time."""
+        is_first = stretch.start_ns <= self.manifest.start_ns
+        is_last = stretch.end_ns >= self.manifest.end_ns
+        tables = {}
+        for name in ("scans", "references"):
+            t_ns = self.table(name).t_ns
+            own = (is_first | (t_ns >= stretch.start_ns)) & (is_last | (t_ns < stretch.end_ns))
+            tables[name] = self.table(name).take(own)
+        return replace(self, tables={**self.tables, **tables}, stretch=stretch)
 
     @cached_property
     def transforms(self) -> TransformBuffer:

@@ -126,11 +126,15 @@ def _missing(answers: dict[str, Any]) -> Table | str:
 
 
 def _maps(answers: dict[str, Any]) -> Table:
-    table = _grid("Maps, the last one is active", "version", "from", "cells", "m per cell")
+    title = "Maps, the last one holds at the end"
+    table = _grid(title, "version", "from", "cells", "m per cell", "held, s")
+    start_ns = answers["bundle"]["start_ns"]
     for entry in answers["maps"]:
         size = f"{entry['width']} x {entry['height']}"
         resolution = f"{entry['resolution_m']:g}"
-        table.add_row(entry["folder"], _text(entry["source"]), size, resolution)
+        spans = [tuple((t - start_ns) / 1e9 for t in span) for span in entry["held_ns"]]
+        held = ", ".join(f"{first:.1f} to {last:.1f}" for first, last in spans)
+        table.add_row(entry["folder"], _text(entry["source"]), size, resolution, held)
     return table
 
 

@@ -44,6 +44,10 @@ class Beams:
     def __len__(self) -> int:
         return len(self.t_ns)
 
+    def take(self, scans: NDArray[np.int64]) -> Beams:
+        """Some of the scans, by index."""
+        return Beams(self.t_ns[scans], self.ends[scans], self.kind[scans], self.laser_xy)
+
     def points(self, scan: int) -> se2.Array:
         """(M, 2) ends of the beams that hit something."""
         return self.ends[scan, self.kind[scan] == HIT].astype(np.float64)

@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import distance_transform_edt
 
 from slamreplay.bundle.products import Changes
 from slamreplay.geometry import se2
 from slamreplay.hindsight.beams import HIT, INVALID, MISS, Beams
-from slamreplay.hindsight.changed_beams import BEYOND, BEYOND_M, NEARER, SILENT, BeamsOnMap, on_map
+from slamreplay.hindsight.changed_beams import BEYOND, BEYOND_M, NEARER, SILENT, BeamsOnMap
 from slamreplay.hindsight.correction import Edits, corrected, last_state
+from slamreplay.hindsight.earlier import Earlier, laid_over, near_walls
 from slamreplay.hindsight.emptied import empty_since, went_with_it
 from slamreplay.hindsight.evidence import Lattice, end_cells, lattice, passes
 from slamreplay.hindsight.freshness import freshness_of
 from slamreplay.hindsight.gone import gone
+from slamreplay.hindsight.mapper import drawn_late, drawn_wrongly
 from slamreplay.hindsight.reach import is_lossy, proven_reach_m
 from slamreplay.hindsight.regions import Contradictions, changed_regions
 from slamreplay.hindsight.standing import asked_cells, standing
@@ -31,6 +33,7 @@ def find_changes(
     beams: Beams,
     poses: se2.Array,
     *,
+    earlier: Sequence[Earlier] = (),
     correct_map: bool = False,
 ) -> Changes:
     """Changed beams of every scan, and the changed cells behind them.
@@ -40,29 +43,39 @@ def find_changes(
         working: the same map, as it is searched.
         beams: the scans.
         poses: (N, 3) of the base in the grid's frame, NaN where there is none.
+        earlier: versions that held before this one: beams of their time are compared with them.
+            What is to be corrected of this map, and how old its claims are, the whole log says.
         correct_map: propose a map, too: it is checked by looking again, which takes as long again.
     """
     poses = np.ascontiguousarray(poses)
-    changes, edits = _look(grid, working, beams, poses)
+    changes, edits = _look(grid, working, earlier, beams, poses)
+    if earlier:
+        of_newest, edits = _look(grid, working, (), beams, poses)
+        changes = replace(changes, freshness=of_newest.freshness)
     if not correct_map:
         return changes
 
     def look_again(now: OccupancyGrid) -> Edits | None:
         walls = working_map(now)
-        return None if walls is None else _look(now, walls, beams, poses)[1]
+        return None if walls is None else _look(now, walls, (), beams, poses)[1]
 
     return replace(changes, corrected=corrected(grid, edits, look_again))
 
 
 def _look(
-    grid: OccupancyGrid, working: WorkingMap, beams: Beams, poses: se2.Array
+    grid: OccupancyGrid,
+    working: WorkingMap,
+    earlier: Sequence[Earlier],
+    beams: Beams,
+    poses: se2.Array,
 ) -> tuple[Changes, Edits]:
-    """What contradicts this map, and how to mend it."""
-    laid = on_map(working, beams, poses)
+    """What contradicts the map of its time, and how to mend this one."""
+    over = laid_over(working, earlier, beams, poses)
+    laid, drawn = over.beams, over.drawn
     reach_m = proven_reach_m(beams, laid)
     blind = (beams.kind == MISS) & (laid.says == BEYOND) & ~(laid.wall_m + BEYOND_M < reach_m)
     laid.says[blind] = SILENT
-    laid.says[_near_a_wall(working, laid)] = SILENT
+    laid.says[over.near] = SILENT
     veil = veils(beams)
     solid = replace(laid, says=np.where(veil, np.int8(SILENT), laid.says))
     where = lattice(working, beams.t_ns)
@@ -77,6 +90,13 @@ def _look(
     met = (ends >= 0) & ~veil[beams.kind == HIT]  # a veil fills no place, but hides a wall
     new = standing(where, solid, slots, passed.through, (ends[met], bins[met]))
     away = gone(where, laid, ended)
+    if earlier:
+        late, wrong = (
+            drawn_late(where, working, over, new),
+            drawn_wrongly(where, working, over, away),
+        )
+        new = replace(new, holds=new.holds & ~late[:, None])
+        away = replace(away, holds=away.holds & ~wrong[:, None])
     is_new = _at(where, laid, NEARER, new.slots, new.holds)
     is_gone = _at(where, laid, BEYOND, away.slots, away.holds)
 
@@ -87,15 +107,17 @@ def _look(
     appeared = _mask(working, laid.where[is_new])
     removed = _mask(working, laid.where[is_gone])
     empty = where.fine(empty_since(where, ended, passed), working.walls.shape)
-    with_it = went_with_it(working, removed, empty)
-    first, removed = removed, removed | (with_it & working.walls)
+    with_it = went_with_it(drawn, removed, empty)
+    first, removed = removed, removed | (with_it & drawn.walls)
     new_clear = _clear(working, where, new.slots, new.seen_s, new.through_s)
     gone_clear = _clear(working, where, away.slots, away.through_s, away.seen_s)
     regions = changed_regions(
-        working,
+        drawn,
         Contradictions("appeared", appeared, is_new, laid.where, beams.t_ns, new_clear),
         Contradictions("removed", removed, is_gone, laid.where, beams.t_ns, gone_clear),
     )
+    if earlier:  # a later version has drawn it
+        appeared = appeared & ~near_walls(working)
     stands, wiped = (where.fine(m, working.walls.shape) for m in last_state(where, new, away))
     opened = _to_grid(grid, working, with_it & working.unknown)
     occupied = _to_grid(grid, working, appeared & stands)
@@ -113,12 +135,6 @@ def _look(
         freshness_of(working, where, laid, beams.t_ns, passed, new, away, removed),
     )
     return changes, edits
-
-
-def _near_a_wall(working: WorkingMap, laid: BeamsOnMap) -> NDArray[np.bool_]:
-    """(N, B) beams that end before their wall, but so near to another one that it explains them."""
-    apart_m = distance_transform_edt(~working.walls) * working.resolution_m
-    return (laid.says == NEARER) & (apart_m.ravel()[laid.where] <= BEYOND_M)
 
 
 def _at(

@@ -55,6 +55,13 @@ class Lattice:
         whole = np.repeat(np.repeat(mask, self.step, axis=0), self.step, axis=1)
         return whole[: shape[0], : shape[1]]
 
+    def coarse(self, mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """(H, W) evidence cells that hold at least one such cell of the working map."""
+        step, (rows, cols) = self.step, self.shape
+        whole = np.zeros((rows * step, cols * step), dtype=bool)
+        whole[: mask.shape[0], : mask.shape[1]] = mask
+        return np.asarray(whole.reshape(rows, step, cols, step).any(axis=(1, 3)))
+
 
 def lattice(working: WorkingMap, t_ns: NDArray[np.int64]) -> Lattice:
     """The lattice over a map, and over the times (N,) of its scans, ascending."""

@@ -36,14 +36,14 @@ def freshness_of(
         away: which walls are gone, and when.
         removed: (H, W) of the working map, all walls that are gone.
     """
-    wall = _any(where, working.walls)
-    free = ~wall & _any(where, ~working.unknown)
+    wall = where.coarse(working.walls)
+    free = ~wall & where.coarse(~working.unknown)
     went = np.where(passed.last >= 0, t_ns[np.maximum(passed.last, 0)], NEVER)
     confirmed = np.where(free, went, NEVER)
     met, beam = np.nonzero(laid.says == MET)
     cells = where.cells_of(laid.where[met, beam])
     np.maximum.at(confirmed.ravel(), cells, t_ns[met])
-    contradicted = np.where(wall & _any(where, removed), went, NEVER)
+    contradicted = np.where(wall & where.coarse(removed), went, NEVER)
     end_of_bin = t_ns[np.searchsorted(where.bins, np.arange(where.bin_count), side="right") - 1]
     for slots, holds, says in (
         (new.slots, new.holds & new.seen, new.empty & ~new.holds),
@@ -68,11 +68,3 @@ def freshness_of(
 def _last(when: NDArray[np.bool_], end_of_bin: NDArray[np.int64]) -> NDArray[np.int64]:
     last = when.shape[1] - 1 - np.argmax(when[:, ::-1], axis=1)
     return np.where(when.any(axis=1), end_of_bin[last], NEVER)
-
-
-def _any(where: Lattice, mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """(H, W) evidence cells that hold at least one such cell of the working map."""
-    step, (rows, cols) = where.step, where.shape
-    whole = np.zeros((rows * step, cols * step), dtype=bool)
-    whole[: mask.shape[0], : mask.shape[1]] = mask
-    return np.asarray(whole.reshape(rows, step, cols, step).any(axis=(1, 3)))

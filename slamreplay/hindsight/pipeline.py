@@ -7,11 +7,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from slamreplay.bundle.products import Changes, Hindsight
+from slamreplay.bundle.map_course import MapStretch
+from slamreplay.bundle.products import Changes, Hindsight, Part
 from slamreplay.bundle.scans import ScanSet, scan_sets
 from slamreplay.bundle.track import PoseTrack
 from slamreplay.bundle.view import BundleView
@@ -22,7 +24,9 @@ from slamreplay.hindsight.bridging import bridged
 from slamreplay.hindsight.carry import carry, scan_scores, settle
 from slamreplay.hindsight.chain import Chain, torn_links
 from slamreplay.hindsight.changes import find_changes
+from slamreplay.hindsight.earlier import Earlier, earlier_versions
 from slamreplay.hindsight.heirs import with_heirs
+from slamreplay.hindsight.joined import joined, nowhere
 from slamreplay.hindsight.laid import laid_out
 from slamreplay.hindsight.places import (
     JUMP_BROKEN,
@@ -54,11 +58,15 @@ Progress = Callable[[str, float], None]
 
 @dataclass(frozen=True, eq=False)
 class _Drawn:
-    """The map: as it was drawn, as it is searched, and whether a corrected one is asked for."""
+    """The map: as it was drawn, as it is searched, and whether a corrected one is asked for.
+
+    `earlier` are the versions of the same place that held before it.
+    """
 
     grid: OccupancyGrid
     working: WorkingMap
     correct_map: bool
+    earlier: tuple[Earlier, ...] = ()
 
 
 def hindsight(
@@ -66,22 +74,58 @@ def hindsight(
 ) -> Hindsight | None:
     """Where the robot really was, from scans, odometry and map alone.
 
+    Where the log was given a map of another place on the way, each stretch is rebuilt in its own
+    map and the results are joined.
+
     Args:
         view: the evidence.
-        correct_map: propose a corrected map, too.
+        correct_map: propose a corrected map, too: of the one at the end.
         progress: told the step and its share done, 0 to 1.
 
     Returns:
         None without a map (or one without a single wall) or without scans.
     """
     say = progress or (lambda _step, _share: None)
+    stretches = view.map_stretches
+    if len(stretches) < 2:
+        return _in_one_place(view, say, correct_map=correct_map)
+    found = []
+    for k, stretch in enumerate(stretches):
+        part = view.within(stretch)
+        share = partial(_share_of, say, k, len(stretches))
+        correct = correct_map and k == len(stretches) - 1
+        found.append(_in_one_place(part, share, correct_map=correct))
+    grid = view.grid
+    if grid is None or all(part is None for part in found):
+        return None
+    frames = view.manifest.frames
+    frame, base = frames.map or "map", frames.base or "base_link"
+    parts = [
+        Part(stretch, nowhere(frame, base, _scan_times(view, stretch)) if part is None else part)
+        for stretch, part in zip(stretches, found, strict=True)
+    ]
+    return joined(parts, frame, grid.cells.shape)
+
+
+def _scan_times(view: BundleView, stretch: MapStretch) -> NDArray[np.int64]:
+    scans = view.within(stretch).role("scan")
+    return np.zeros(0, dtype=np.int64) if scans is None else np.sort(scans.t_ns)
+
+
+def _share_of(say: Progress, done: int, count: int, step: str, share: float) -> None:
+    """A share of one of several rounds, told as that of all of them."""
+    say(step, (done + share) / count)
+
+
+def _in_one_place(view: BundleView, say: Progress, *, correct_map: bool) -> Hindsight | None:
+    """Hindsight in maps that are all of one place."""
     lasers = scan_sets(view)
     grid = view.grid
     working = None if grid is None else working_map(grid)
     if not lasers or grid is None or working is None:
         return None
     base = view.manifest.frames.base or "base_link"
-    drawn = _Drawn(grid, working, correct_map)
+    drawn = _Drawn(grid, working, correct_map, earlier_versions(view))
     whole = _rebuilt(view, base, drawn, lasers, say)
     if whole is not None and (len(lasers) == 1 or whole.coverage >= _BOTH_KNOW):
         return whole
@@ -103,10 +147,10 @@ def _rebuilt(
     motion, each, beams, odometry = laid.motion, laid.each, laid.beams, laid.odometry
     keys, points, chain = laid.keys, laid.points, laid.chain
     if not len(keys):
-        return _nowhere(grid.frame_id, base, beams)
+        return nowhere(grid.frame_id, base, beams.t_ns)
     found = submaps(chain, points, beams.laser_xy)
     if not found:
-        return _nowhere(grid.frame_id, base, beams)
+        return nowhere(grid.frame_id, base, beams.t_ns)
     field = working.field(SIGMA_M)
     space = search_space(working, field)
     motions, is_break = _between_submaps(chain, found)
@@ -184,11 +228,17 @@ def _second_misfits(
 
 def _changes(drawn: _Drawn, each: list[Beams], poses: se2.Array, motion: PoseTrack) -> Changes:
     """Changes seen by all lasers; the shares are pooled at the first one's scans."""
-    grid, working, correct_map = drawn.grid, drawn.working, drawn.correct_map
+    look = partial(
+        find_changes,
+        drawn.grid,
+        drawn.working,
+        earlier=drawn.earlier,
+        correct_map=drawn.correct_map,
+    )
     if len(each) == 1:
-        return find_changes(grid, working, each[0], poses, correct_map=correct_map)
+        return look(each[0], poses)
     both, both_poses, is_first = interleaved(each[0], each[1], poses, motion)
-    found = find_changes(grid, working, both, both_poses, correct_map=correct_map)
+    found = look(both, both_poses)
     return replace(
         found,
         t_ns=found.t_ns[is_first],
@@ -203,12 +253,6 @@ def _between_submaps(chain: Chain, found: list[Submap]) -> tuple[se2.Array, NDAr
     motions = se2.between(chain.xyyaw[reference[:-1]], chain.xyyaw[reference[1:]])
     broken = np.cumsum(chain.is_break)
     return motions, np.asarray(broken[reference[1:]] > broken[reference[:-1]])
-
-
-def _nowhere(frame: str, base: str, beams: Beams) -> Hindsight:
-    n = len(beams)
-    track = PoseTrack.without_covariance(frame, base, beams.t_ns, np.full((n, 3), np.nan))
-    return Hindsight(track, float("nan"), 0.0, np.full(n, np.nan), None, None)
 
 
 def _jump_costs(chain: Chain, found: list[Submap]) -> se2.Array:

@@ -63,7 +63,12 @@ def changed_regions(
     """
     new, old = _patches(working, appeared), _patches(working, removed)
     things = outlines(working, [p.cells_m for p in old], [p.cells for p in old])
-    moves = pairs([p.cells_m for p in new], things)
+    # What stands where a version of the map had drawn something else has not moved there.
+    moves = [
+        (i, j, alike)
+        for i, j, alike in pairs([p.cells_m for p in new], things)
+        if not _overlap(new[i].cells, old[j].cells)
+    ]
     regions = [
         _moved(new[i].region, old[j].region, _bbox_m(working, things[j]), alike)
         for i, j, alike in moves
@@ -71,6 +76,11 @@ def changed_regions(
     regions += [p.region for i, p in enumerate(new) if i not in {move[0] for move in moves}]
     regions += [p.region for j, p in enumerate(old) if j not in {move[1] for move in moves}]
     return tuple(sorted(regions, key=lambda r: (-r.area_m2, r.bbox_m, r.kind)))
+
+
+def _overlap(one: NDArray[np.int64], other: NDArray[np.int64]) -> bool:
+    """Whether two lists of cells (N, 2) have any in common."""
+    return not set(map(tuple, one.tolist())).isdisjoint(map(tuple, other.tolist()))
 
 
 def _patches(working: WorkingMap, found: Contradictions) -> list[_Patch]:

@@ -12,7 +12,9 @@ from slamreplay.bundle.manifest import Loss, Source
 from slamreplay.bundle.view import ROLE_TABLES
 from slamreplay.geometry.times import NO_STAMP
 from slamreplay.ingest.cast import Cast
-from slamreplay.ingest.grids import given_map, map_rows, recorded_maps
+from slamreplay.ingest.grid_updates import fitting, grid_of
+from slamreplay.ingest.grids import given_map
+from slamreplay.ingest.map_versions import recorded_maps
 from slamreplay.ingest.names import is_reference, is_sensed_dock, why_no_dock
 from slamreplay.ingest.roles import Choice, is_command, is_costmap, is_estimate, is_initial_pose
 from slamreplay.ingest.rows import TopicRows
@@ -50,22 +52,36 @@ def lay_out(cast: Cast, map_yaml: Path | None) -> Layers:
     """
     layers = Layers(choices=dict(cast.choices))
     table_of = {c.rows.topic: ROLE_TABLES[role] for role, c in cast.choices.items()}
+    windows = {grid_of(t): t for t in cast.topics if t.table == "costmap_updates" and len(t)}
     for topic in cast.topics:
         reason = _no_use(topic, cast, table_of, map_yaml)
         if reason is not None:
             loss = Loss(kind="skipped", what=topic.topic, count=topic.messages, reason=reason)
             layers.losses.append(loss)
         elif table_of.get(topic.topic) == "map_updates":
-            grids, versions, losses = recorded_maps(topic)
-            for grid in grids:
+            maps = recorded_maps(topic, windows.get(topic.topic))
+            for grid in maps.grids:
                 layers.grids[f"{topic.topic} {len(layers.grids) + 1}"] = grid
-            layers.topics.append(map_rows(topic, versions))
-            layers.losses += losses
+            layers.topics += maps.updates
+            layers.losses += maps.losses
+        elif topic.table == "costmap_updates":
+            grids = _whole_grids(topic, cast) if len(topic) else None
+            if grids is not None and table_of.get(grids.topic) != "map_updates":
+                rows, losses = fitting(grids, topic)
+                layers.topics.append(rows)
+                layers.losses += losses
         else:
             layers.topics.append(_in_its_table(topic, cast, table_of))
     if map_yaml is not None:
         _use_given_map(layers, cast, map_yaml)
     return layers
+
+
+def _whole_grids(windows: TopicRows, cast: Cast) -> TopicRows | None:
+    """The whole grids that windows of a topic belong to, None where the log has none."""
+    name = grid_of(windows)
+    found = [t for t in cast.topics if t.table == "costmaps" and t.topic == name and len(t)]
+    return found[0] if found else None
 
 
 def _no_use(
@@ -76,6 +92,11 @@ def _no_use(
         if table_of[topic.topic] == "map_updates" and map_yaml is not None:
             return "the map given with --map is used instead"
         return None
+    if topic.table == "costmap_updates" and len(topic):
+        grids = _whole_grids(topic, cast)
+        if grids is None:
+            return f"windows of {grid_of(topic)}, of which no whole grid is in the log"
+        return _no_use(grids, cast, table_of, map_yaml)
     if topic.table == "costmaps" and not is_costmap(topic):
         return "a grid that is neither the map nor a costmap"
     if topic.table == "points":

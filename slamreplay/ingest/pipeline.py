@@ -9,7 +9,10 @@ from tempfile import TemporaryDirectory
 
 from slamreplay.bundle.atomic import check_target
 from slamreplay.bundle.manifest import Frames, Loss, Manifest, Role, Source
+from slamreplay.bundle.map_course import map_course
+from slamreplay.bundle.schema import TABLES
 from slamreplay.bundle.store import MANIFEST, write_bundle
+from slamreplay.bundle.tables import Table
 from slamreplay.bundle.view import Bundle
 from slamreplay.ingest.assembly import Assembly
 from slamreplay.ingest.cast import Cast, settle_cast
@@ -35,6 +38,7 @@ from slamreplay.ingest.rows import TopicRows
 from slamreplay.ingest.span import clock_between, cut, evidence_span
 from slamreplay.ingest.tables import build
 from slamreplay.ingest.text_logs import read_text_log
+from slamreplay.maps.grid import OccupancyGrid
 
 
 def ingest(
@@ -111,7 +115,8 @@ def _ingest(
         losses=_sorted(losses),
         tables={},
     )
-    write_bundle(target, manifest, with_inferred(manifest, tables), layers.grids)
+    grids = _held(layers.grids, tables, span)
+    write_bundle(target, manifest, with_inferred(manifest, tables), grids)
     return Bundle.open(target)
 
 
@@ -172,6 +177,19 @@ def _survey(path: Path, frames: Frames) -> tuple[TopicRows, Source, list[Loss]]:
     digest = hashlib.sha256(content).hexdigest()
     source = Source(name=path.name, format="reference", bytes=len(content), sha256=digest)
     return rows, source, losses
+
+
+def _held(
+    grids: Mapping[str, OccupancyGrid], tables: Mapping[str, Assembly], span: tuple[int, int]
+) -> dict[str, OccupancyGrid]:
+    """The maps that held in the span, in the order in which they did so last."""
+    if len(grids) < 2:
+        return dict(grids)
+    source = {grid.version: name for name, grid in grids.items()}
+    updates = Table.concat(TABLES["map_updates"], tables["map_updates"].groups())
+    course = map_course(updates, list(source), *span)
+    last = dict.fromkeys(h.version for h in reversed(course))
+    return {source[version]: grids[source[version]] for version in reversed(last)}
 
 
 def _texts(options: IngestOptions) -> dict[str, str]:

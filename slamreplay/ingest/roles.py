@@ -54,7 +54,8 @@ def is_costmap(topic: TopicRows) -> bool:
     """A cost grid, not a map: by type or by name."""
     words = tokens(topic.topic)
     named = "costmap" in words or any(w.startswith("costmap") for w in words)
-    return topic.table == "costmaps" and (named or topic.type.endswith("/Costmap"))
+    typed = topic.type.endswith(("/Costmap", "/VoxelGrid"))
+    return topic.table == "costmaps" and (named or typed)
 
 
 def choose_reference(topics: Sequence[TopicRows]) -> Choice | None:
@@ -157,10 +158,13 @@ def choose_map(topics: Sequence[TopicRows]) -> Choice | None:
 
 
 def choose_costmap(topics: Sequence[TopicRows]) -> Choice | None:
-    """The local costmap; a global one where there is no other."""
+    """The local costmap; a global one where there is no other. Voxels are what it is made of."""
     found = [t for t in topics if len(t) and is_costmap(t)]
-    return _pick(found, lambda t: ("local" in tokens(t.topic), t.messages), "cost grid",
-                 "local before global")  # fmt: skip
+
+    def rank(t: TopicRows) -> tuple[object, ...]:
+        return ("local" in tokens(t.topic), not t.type.endswith("/VoxelGrid"), t.messages)
+
+    return _pick(found, rank, "cost grid", "local before global")
 
 
 def choose_simple(

@@ -14,7 +14,7 @@ from slamreplay.geometry.times import ns
 from slamreplay.ingest.assembly import Assembly
 
 #: Tables whose latest row before the start still holds after it.
-_HOLDING = ("transforms", "poses", "initial_poses", "map_updates")
+_HOLDING = ("transforms", "poses", "initial_poses")
 
 
 def evidence_span(
@@ -51,8 +51,9 @@ def cut(
 ) -> tuple[dict[str, Assembly], tuple[int, int]]:
     """Tables and span between two times, given in seconds after the span's start.
 
-    Of what holds until it is replaced (maps, static transforms, the localizer's last word) the
-    latest row before the start is kept.
+    Of what holds until it is replaced (static transforms, the localizer's last word) the latest row
+    before the start is kept; of map versions every row, for not every version has its map; of a
+    costmap with windows the last whole grid and the windows since.
 
     Raises:
         UsageError: nothing lies between.
@@ -66,7 +67,8 @@ def cut(
             f"nothing is left between --start {start_s or 0:g} and --end {end_s or 0:g}",
             hint=f"the log lasts {(span[1] - span[0]) / 1e9:.1f} s",
         )
-    return {name: _part(table, start, end) for name, table in tables.items()}, (start, end)
+    parts = {name: _part(table, start, end) for name, table in tables.items()}
+    return parts | _costmaps_part(tables, start, end), (start, end)
 
 
 def clock_between(clock: Clock, tables: Mapping[str, Assembly]) -> Clock:
@@ -86,9 +88,25 @@ def _part(table: Assembly, start: int, end: int) -> Assembly:
     keep = (t >= start) & (t <= end)
     if table.schema.name == "transforms":
         keep |= table["is_static"]
+    if table.schema.name == "map_updates":
+        keep |= t < start
     if table.schema.name in _HOLDING:
         keep[_latest_before(table, start)] = True
     return table.take(keep)
+
+
+def _costmaps_part(tables: Mapping[str, Assembly], start: int, end: int) -> dict[str, Assembly]:
+    """Whole grids and windows of the costmaps that have windows before the start."""
+    if not (_rows(tables, "costmaps") and _rows(tables, "costmap_updates")):
+        return {}
+    grids, windows = tables["costmaps"], tables["costmap_updates"]
+    keep = [(t.t_ns >= start) & (t.t_ns <= end) for t in (grids, windows)]
+    for row in _latest_before(grids, start).tolist():
+        own = windows["grid_topic"] == grids["topic"][row]
+        if own.any():
+            keep[0][row] = True
+            keep[1] |= own & (windows.t_ns >= grids.t_ns[row]) & (windows.t_ns <= end)
+    return {"costmaps": grids.take(keep[0]), "costmap_updates": windows.take(keep[1])}
 
 
 def _latest_before(table: Assembly, start: int) -> NDArray[np.int64]:

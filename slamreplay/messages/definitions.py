@@ -12,6 +12,7 @@ UbiquityRobotics/fiducials, magazino/move_base_flex.
 
 from __future__ import annotations
 
+from slamreplay.messages.costmaps import COSTMAPS
 from slamreplay.messages.drives import DRIVES
 from slamreplay.messages.foxglove import FOXGLOVE_DEFINITIONS
 from slamreplay.messages.recoveries import LATER_RECOVERIES, RECOVERIES
@@ -117,6 +118,7 @@ DEFINITIONS: dict[str, str] = {
     # tf of ROS 1: the store of Noetic has neither name.
     "tf/msg/tfMessage": "geometry_msgs/TransformStamped[] transforms\n",
     "tf2_msgs/msg/TFMessage": "geometry_msgs/TransformStamped[] transforms\n",
+    **COSTMAPS,
     **DRIVES,
     **FOXGLOVE_DEFINITIONS,
     **RECOVERIES,

@@ -33,6 +33,7 @@ def build(post: Postmortem) -> Report:
     judgement, manifest, hindsight = post.judgement, post.manifest, post.hindsight
     mode = judgement.failure_mode
     regions = () if hindsight is None or hindsight.changes is None else hindsight.changes.regions
+    map_version = None if post.grid is None else post.grid.version
     return Report(
         schema_version=SCHEMA_VERSION,
         slamreplay=__version__,
@@ -42,7 +43,7 @@ def build(post: Postmortem) -> Report:
             start_ns=manifest.start_ns,
             end_ns=manifest.end_ns,
             clock=manifest.clock.name,
-            map_version=None if post.grid is None else post.grid.version,
+            map_version=map_version,
             missing=manifest.missing_parts(),
         ),
         verdict=VerdictPart(
@@ -56,7 +57,15 @@ def build(post: Postmortem) -> Report:
             for i in judgement.intervals
         ],
         changed_regions=[
-            RegionPart(**_picked(r, RegionPart, bbox_m=_bbox(r.bbox_m), from_bbox_m=_from(r)))
+            RegionPart(
+                **_picked(
+                    r,
+                    RegionPart,
+                    bbox_m=_bbox(r.bbox_m),
+                    from_bbox_m=_from(r),
+                    map_version=r.map_version or map_version,
+                )
+            )
             for r in regions
         ],
         reference=_reference(post),

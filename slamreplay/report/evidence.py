@@ -37,7 +37,7 @@ class Postmortem:
 
     Attributes:
         manifest: what the log had and lacked.
-        grid: the map, None without one.
+        grid: the map at the end, None without one.
         belief: what the robot believed at each scan, None where no localizer spoke.
         hindsight: where it really was, None where that cannot be rebuilt.
         reference: what NEES and trial metrics are measured against, None without any.
@@ -70,6 +70,12 @@ class Postmortem:
     def seconds(self, t_ns: ArrayLike) -> se2.Array:
         """Seconds since the log's start, for text and figures."""
         return seconds_since(t_ns, self.manifest.start_ns)
+
+    @property
+    def drawn_from_ns(self) -> int:
+        """From when on the log is in the place of its last map: before, nothing fits into that."""
+        parts = () if self.hindsight is None else self.hindsight.parts
+        return parts[-1].stretch.start_ns if parts else self.manifest.start_ns
 
     @cached_property
     def error(self) -> BeliefError | None:

@@ -81,7 +81,8 @@ class IntervalPart(_Strict):
 class RegionPart(_Strict):
     """A patch of the map that is not true; boxes are x_min, y_min, x_max, y_max in the map frame.
 
-    `from_bbox_m` is the old place of a moved region, null otherwise.
+    `from_bbox_m` is the old place of a moved region, null otherwise. `map_version` is of the map it
+    is drawn in: the bundle's, unless the log was given the map of another place on the way.
     """
 
     kind: Literal["appeared", "removed", "moved"]
@@ -92,6 +93,7 @@ class RegionPart(_Strict):
     last_seen_ns: Ns
     views: Ns
     confidence: Share
+    map_version: str | None
 
 
 class ReferencePart(_Strict):

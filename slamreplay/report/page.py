@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 
 from slamreplay import __version__
-from slamreplay.bundle.manifest import Manifest
+from slamreplay.bundle.manifest import Manifest, MapVersion
 from slamreplay.geometry.times import NS_PER_S
 from slamreplay.report import phrases, tables
 from slamreplay.report.assess import not_assessable, title_of
@@ -54,6 +54,7 @@ class Page:
     sources: Table
     map_files: str
     map_alt: str
+    map_note: str
     course_alt: str
     covariance_alt: str
     reference_note: str
@@ -113,6 +114,7 @@ def page(post: Postmortem) -> Page:
         ),
         map_files=_map_files(post),
         map_alt=phrases.map_alt(post),
+        map_note=phrases.map_note(post),
         course_alt=phrases.course_alt(post),
         covariance_alt=phrases.covariance_alt(post),
         reference_note=phrases.reference_note(post),
@@ -155,12 +157,20 @@ def _audit(manifest: Manifest) -> tuple[tuple[str, str], ...]:
             "map",
             "; ".join(
                 f"{m.source}: {m.width} x {m.height} cells of {m.resolution_m:g} m, {m.version}"
+                f"{_held(m, manifest.start_ns) if len(manifest.maps) > 1 else ''}"
                 for m in manifest.maps
             )
             or "none",
         ),
         ("options", ", ".join(f"{k} = {v}" for k, v in manifest.options.items()) or "defaults"),
     )
+
+
+def _held(version: MapVersion, start_ns: int) -> str:
+    spans = (
+        f"{(a - start_ns) / NS_PER_S:.1f} to {seconds(b - start_ns)}" for a, b in version.held_ns
+    )
+    return f", held {', '.join(spans)}"
 
 
 def _map_files(post: Postmortem) -> str:

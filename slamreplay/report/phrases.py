@@ -69,6 +69,23 @@ def map_alt(post: Postmortem) -> str:
     )
 
 
+def map_note(post: Postmortem) -> str:
+    """Which of several maps places and changes are drawn in; nothing where one held all along."""
+    maps = post.manifest.maps
+    if post.grid is None or len(maps) < 2:
+        return ""
+    held = [span for m in maps if m.version == post.grid.version for span in m.held_ns]
+    since = f" from {seconds(held[-1][0] - post.manifest.start_ns)} on" if held else ""
+    text = (
+        f"{len(maps)} map versions held, one after the other. Each moment was compared with its "
+        f"own; regions, changed.pgm and freshness are drawn in the last one, which held{since}."
+    )
+    if post.drawn_from_ns > post.manifest.start_ns:
+        first = seconds(post.drawn_from_ns - post.manifest.start_ns)
+        text += f" Until {first} the log is in another map and not in this figure."
+    return text
+
+
 def course_alt(post: Postmortem) -> str:
     """The figure of the log's course in words."""
     states = "; ".join(

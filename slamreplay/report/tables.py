@@ -139,7 +139,8 @@ def regions(post: Postmortem) -> Table:
                 ""
                 if r.from_bbox_m is None
                 else " (was at {:.1f}, {:.1f} to {:.1f}, {:.1f} m)".format(*r.from_bbox_m)
-            ),
+            )
+            + ("" if r.map_version is None else f" in map {r.map_version[-8:]}"),
             number(r.area_m2, ".2f", "m²"),
             span(post, r.first_seen_ns, r.last_seen_ns),
             f"{r.views}",

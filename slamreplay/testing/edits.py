@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from slamreplay.bundle.manifest import MapVersion
+from slamreplay.bundle.map_course import map_course
 from slamreplay.bundle.schema import JUDGING_KINDS, TABLES
 from slamreplay.bundle.tables import Ragged, Table
 from slamreplay.bundle.view import Bundle, BundleView
@@ -22,12 +24,46 @@ def rebuilt(
 ) -> Bundle:
     """A bundle in memory with some tables exchanged, and the map too (None takes it away)."""
     whole = {name: tables.get(name, bundle.table(name)) for name in TABLES}
-    kept = bundle.grid() if isinstance(grid, str) else grid
-    maps = []
+    if isinstance(grid, str):
+        return Bundle(bundle.manifest, whole, bundle.grids())
+    kept, maps = grid, []
     if kept is not None and bundle.manifest.maps:
         maps = [bundle.manifest.maps[-1].model_copy(update={"version": kept.version})]
     manifest = bundle.manifest.model_copy(update={"maps": maps})
     return Bundle(manifest, whole, {kept.version: kept} if kept is not None else {})
+
+
+def with_maps(bundle: Bundle, course: Sequence[tuple[int, OccupancyGrid]]) -> Bundle:
+    """The bundle with a map of one topic that changes: each grid holds from its time (ns) on."""
+    times = np.array([t_ns for t_ns, _ in course], dtype=np.int64)
+    columns = {
+        "t_ns": times,
+        "t_sensor_ns": times,
+        "t_log_ns": times,
+        "topic": ["/map"] * len(course),
+        "map_version": [grid.version for _, grid in course],
+        "frame_id": [grid.frame_id for _, grid in course],
+    }
+    updates = Table(TABLES["map_updates"], columns)
+    # The version that holds last is the newest, however often it held before.
+    grids = {grid.version: grid for _, grid in sorted(course, key=lambda c: -c[0])}
+    span = bundle.manifest.start_ns, bundle.manifest.end_ns
+    held = map_course(updates, list(reversed(grids)), *span)
+    maps = [
+        MapVersion(
+            version=version,
+            folder=version.removeprefix("sha256:")[:16],
+            source="/map",
+            width=grid.cells.shape[1],
+            height=grid.cells.shape[0],
+            resolution_m=grid.resolution_m,
+            held_ns=[(h.start_ns, h.end_ns) for h in held if h.version == version],
+        )
+        for version, grid in reversed(grids.items())
+    ]
+    manifest = bundle.manifest.model_copy(update={"maps": maps})
+    tables = {name: bundle.table(name) for name in TABLES}
+    return Bundle(manifest, {**tables, "map_updates": updates}, grids)
 
 
 def fingerprint(table: Table) -> str:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from slamreplay.bundle.costmaps import Costmaps, whole_grid
 from slamreplay.bundle.odometry import odometry_track
 from slamreplay.bundle.tables import Table
 from slamreplay.bundle.track import PoseTrack
@@ -47,14 +48,11 @@ class Obstacles:
     ) -> None:
         self._belief = belief
         self._odometry = odometry_track(view)
-        costmaps = view.role("costmap")
-        self._costmaps = (
-            None if costmaps is None or not len(costmaps) else costmaps.sorted_by_time()
-        )
-        told = None if self._costmaps is None else inscribed_radius_m(self._costmaps)
+        self._costmaps = Costmaps.of(view)
+        told = None if self._costmaps is None else inscribed_radius_m(self._costmaps.whole)
         self.radius_m = footprint_radius_m if told is None else told
-        self._tree: cKDTree | None = None
-        self._walls = None if view.grid is None else _centres(view.grid, view.grid.occupied)
+        self._view = view
+        self._of_map: tuple[str, cKDTree | None] = ("", None)
 
     def clearance(self, t_ns: int, path_xy: se2.Array = HERE) -> Clearance | None:
         """At a time on the bundle's clock; None where neither costmap nor map can tell.
@@ -64,22 +62,32 @@ class Obstacles:
             path_xy: (M, 2) places the robot is about to pass, in its base frame at that time.
         """
         found = self._from_costmap(t_ns, path_xy)
-        if found is not None or self._walls is None or not len(self._walls):
+        if found is not None:
             return found
         pose = _latest(self._belief, t_ns)
-        if pose is None:
+        walls = None if pose is None else self._walls_at(t_ns)
+        if pose is None or walls is None:
             return None
-        if self._tree is None:
-            self._tree = cKDTree(self._walls)
-        return self._nearest(self._tree, pose, path_xy, 0.0)
+        return self._nearest(walls, pose, path_xy, 0.0)
+
+    def _walls_at(self, t_ns: int) -> cKDTree | None:
+        """The walls of the map version that held at a time, None without any."""
+        course = self._view.map_course
+        held = [h for h in course if h.start_ns <= t_ns] or list(course[:1])
+        if not held:
+            return None
+        version = held[-1].version
+        if self._of_map[0] != version:
+            grid = self._view.grid_of(version)
+            walls = np.empty((0, 2)) if grid is None else _centres(grid, grid.occupied)
+            self._of_map = version, cKDTree(walls) if len(walls) else None
+        return self._of_map[1]
 
     def _from_costmap(self, t_ns: int, path_xy: se2.Array) -> Clearance | None:
-        if self._costmaps is None:
+        costmap = None if self._costmaps is None else self._costmaps.at(t_ns)
+        if costmap is None or t_ns - costmap.t_ns > FRESH_NS:
             return None
-        row = int(np.searchsorted(self._costmaps.t_ns, t_ns, side="right")) - 1
-        if row < 0 or t_ns - self._costmaps.t_ns[row] > FRESH_NS:
-            return None
-        grid = costmap_grid(self._costmaps, row)
+        grid = costmap.grid
         points = _centres(grid, grid.cells >= LETHAL)
         believed = _latest(self._belief, t_ns)
         pose, turn = believed, 0.0
@@ -108,24 +116,13 @@ class Obstacles:
         )
 
 
-def costmap_grid(costmaps: Table, row: int) -> OccupancyGrid:
-    """One costmap as a grid."""
-    height, width = int(costmaps["height"][row]), int(costmaps["width"][row])
-    return OccupancyGrid(
-        costmaps["cells"][row].reshape(height, width).copy(),
-        float(costmaps["resolution_m"][row]),
-        np.array(costmaps["origin_xyyaw"][row]),
-        str(costmaps["frame_id"][row]),
-    )
-
-
 def inscribed_radius_m(costmaps: Table) -> float | None:
     """The robot's inscribed radius as the inflation layer drew it; None where it drew nothing."""
     from scipy.ndimage import distance_transform_edt
 
     radii = []
     for row in np.linspace(0, len(costmaps) - 1, min(5, len(costmaps))).astype(int):
-        grid = costmap_grid(costmaps, row)
+        grid = whole_grid(costmaps, row)
         lethal = grid.cells >= LETHAL
         ring = grid.cells == INSCRIBED
         if lethal.any() and ring.any():

@@ -44,8 +44,8 @@ def verdict_findings(
     found += [_changed(e, hindsight, limits) for e in episodes(intervals, lambda i: i.is_changed)]
     if hindsight is not None:
         found += _unobservable(intervals, hindsight, limits)
-    found += _wrong_map(fit, limits, span)
-    found += _offset(offset, span)
+    found += _wrong_map(fit, limits, view.span)
+    found += _offset(offset, view.span)
     found += _unjudged(intervals, span)
     return tuple(sorted(found, key=lambda f: (-SEVERITIES.index(f.severity), f.start_ns or 0)))
 
@@ -167,7 +167,7 @@ def motion_findings(
     view: BundleView, delay: Delay | None, turned: Wheels | None
 ) -> tuple[Finding, ...]:
     """SR-CLK-002 and SR-ODO-001: what the clocks and the wheels did to the log."""
-    span = (view.manifest.start_ns, view.manifest.end_ns)
+    span = view.span
     found: list[Finding] = []
     if delay is not None and delay.is_significant:
         low, high = (delay.seconds + k * 2.0 * delay.sigma_s for k in (-1, 1))
@@ -180,7 +180,7 @@ def motion_findings(
         )  # fmt: skip
     if turned is not None:
         for slip in turned.slips:
-            text = slip.text(span[0])
+            text = slip.text(view.manifest.start_ns)
             found.append(
                 Finding(
                     "SR-ODO-001", "warning", text, slip.start_ns, slip.end_ns, value=slip.metres,

@@ -56,6 +56,56 @@ def log_state(intervals: Sequence[Interval], limits: Limits) -> State:
     return "insufficient_data" if 2 * (unjudged + unobservable) > whole or not whole else "healthy"
 
 
+def log_confidence(state: State, intervals: Sequence[Interval]) -> float | None:
+    """The mean of the intervals that made the state, each by its length; None if undecided."""
+    if state in ("insufficient_data", "unobservable"):
+        return None
+    wants = {
+        "lost": ("lost", "lost_and_map_changed"),
+        "map_changed": ("map_changed", "lost_and_map_changed"),
+        "lost_and_map_changed": ("lost", "map_changed", "lost_and_map_changed"),
+        "healthy": ("healthy",),
+    }[state]
+    made = [(i.confidence, i.duration_ns) for i in intervals if i.state in wants]
+    sure = [(c, weight) for c, weight in made if c is not None]
+    if not sure:
+        return None
+    return sum(c * weight for c, weight in sure) / sum(weight for _, weight in sure)
+
+
+def joined(parts: Sequence[Sequence[Interval]]) -> tuple[Interval, ...]:
+    """The intervals of neighbouring stretches; where one state goes on they are one."""
+    out: list[Interval] = []
+    for i in (i for part in parts for i in part):
+        if not out or out[-1].state != i.state:
+            out.append(i)
+            continue
+        last = out.pop()
+        out.append(
+            replace(
+                last,
+                end_ns=i.end_ns,
+                confidence=_both(last, i),
+                max_error_m=_most(last.max_error_m, i.max_error_m),
+                max_error_rad=_most(last.max_error_rad, i.max_error_rad),
+                findings=tuple(dict.fromkeys((*last.findings, *i.findings))),
+            )
+        )
+    return tuple(out)
+
+
+def _both(one: Interval, other: Interval) -> float | None:
+    if one.confidence is None or other.confidence is None:
+        return one.confidence if other.confidence is None else other.confidence
+    whole = max(one.duration_ns + other.duration_ns, 1)
+    share = one.duration_ns / whole
+    return share * one.confidence + (1.0 - share) * other.confidence
+
+
+def _most(*values: float | None) -> float | None:
+    return max((v for v in values if v is not None), default=None)
+
+
 def episodes(intervals: Sequence[Interval], wanted: Callable[[Interval], bool]) -> list[Interval]:
     """Neighbouring intervals that answer one question with yes, made one."""
     found: list[Interval] = []
@@ -66,13 +116,11 @@ def episodes(intervals: Sequence[Interval], wanted: Callable[[Interval], bool]) 
         if last is None or last.end_ns != i.start_ns:
             found.append(i)
             continue
-        metres = [v for v in (last.max_error_m, i.max_error_m) if v is not None]
-        radians = [v for v in (last.max_error_rad, i.max_error_rad) if v is not None]
         found[-1] = replace(
             last,
             end_ns=i.end_ns,
-            max_error_m=max(metres, default=None),
-            max_error_rad=max(radians, default=None),
+            max_error_m=_most(last.max_error_m, i.max_error_m),
+            max_error_rad=_most(last.max_error_rad, i.max_error_rad),
         )
     return found
 

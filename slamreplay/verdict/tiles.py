@@ -70,7 +70,7 @@ def gathered(
 
 def intervals_of(view: BundleView, evidence: Evidence, limits: Limits) -> tuple[Interval, ...]:
     """The intervals that tile the log, with their numbers and the ids of their findings."""
-    span = (view.manifest.start_ns, view.manifest.end_ns)
+    span = view.span
     if span[1] <= span[0]:
         return (Interval("insufficient_data", *span, findings=("SR-LOC-004",)),)
     error, changes, bridge = evidence.error, evidence.changes, ns(limits.bridge_s)

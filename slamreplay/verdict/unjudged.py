@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 from slamreplay.bundle.findings import Finding
 from slamreplay.bundle.products import Hindsight
 from slamreplay.bundle.track import PoseTrack
@@ -12,6 +14,7 @@ from slamreplay.verdict.findings import verdict_findings
 from slamreplay.verdict.judgement import FailureMode, Interval, Judgement, State
 from slamreplay.verdict.lacking import lacking
 from slamreplay.verdict.limits import Limits
+from slamreplay.verdict.map_course import map_course_findings
 from slamreplay.verdict.map_fit import MapFit
 from slamreplay.verdict.stops import stop_findings, stops
 from slamreplay.verdict.summary import summary
@@ -36,6 +39,46 @@ def unjudged(
         fit: how badly the scans fit this map; None where that was not asked.
         ambiguous: whether several places explain all scans: unobservable.
     """
+    told = why_unjudged(view, hindsight, fit, ambiguous=ambiguous)
+    whole = (told.interval,)
+    state, mode, start = told.interval.state, told.mode, view.manifest.start_ns
+    found_stops = stops(view, belief, None, whole)
+    done = actions(view, belief, limits)
+    text = summary(
+        state,
+        whole,
+        mode,
+        found_stops,
+        None,
+        None,
+        start_ns=start,
+        has_belief=belief is not None,
+        reason=told.reason,
+    )
+    findings: tuple[Finding, ...] = (
+        *verdict_findings(view, belief, hindsight, whole, None, limits, fit),
+        *map_course_findings(view),
+        *risky(done),
+        *contract_findings(done),
+        *stop_findings(found_stops, start),
+    )
+    left = lacking(view, belief, hindsight, None)
+    return Judgement(state, None, text, whole, mode, found_stops, done, findings, lacking=left)
+
+
+@dataclass(frozen=True)
+class Unjudged:
+    """One interval over the view's span, what could be the matter with it, and why in words."""
+
+    interval: Interval
+    mode: FailureMode
+    reason: str
+
+
+def why_unjudged(
+    view: BundleView, hindsight: Hindsight | None, fit: MapFit | None, *, ambiguous: bool
+) -> Unjudged:
+    """Why nothing can be said of a log or a stretch of it; arguments as in `unjudged`."""
     state: State = "unobservable" if ambiguous else "insufficient_data"
     ids: tuple[str, ...] = ("SR-LOC-002",)
     reason = ""
@@ -55,26 +98,4 @@ def unjudged(
             mode = FailureMode("wrong_map", 0.7, words)
     else:
         mode = FailureMode("sensing_ambiguity", 0.7, ("two places explain all scans equally well",))
-    start = view.manifest.start_ns
-    whole = (Interval(state, start, view.manifest.end_ns, findings=ids),)
-    found_stops = stops(view, belief, None, whole)
-    done = actions(view, belief, limits)
-    text = summary(
-        state,
-        whole,
-        mode,
-        found_stops,
-        None,
-        None,
-        start_ns=start,
-        has_belief=belief is not None,
-        reason=reason,
-    )
-    findings: tuple[Finding, ...] = (
-        *verdict_findings(view, belief, hindsight, whole, None, limits, fit),
-        *risky(done),
-        *contract_findings(done),
-        *stop_findings(found_stops, start),
-    )
-    left = lacking(view, belief, hindsight, None)
-    return Judgement(state, None, text, whole, mode, found_stops, done, findings, lacking=left)
+    return Unjudged(Interval(state, *view.span, findings=ids), mode, reason)

@@ -46,10 +46,14 @@ def _occupancy_grid(messages: Messages) -> Decoded:
     return _decode(messages, "info", "width", "height", messages.ragged("data", np.int8))
 
 
-def _costmap(messages: Messages) -> Decoded:
+def cells_of_costs(messages: Messages) -> Ragged:
+    """Costs of field `data` as 0 to 100 and -1; declared int8, their bytes are the same."""
     costs = messages.ragged("data", np.uint8)
-    cells = Ragged(COST_SCALE[costs.values], costs.offsets)
-    return _decode(messages, "metadata", "size_x", "size_y", cells)
+    return Ragged(COST_SCALE[costs.values], costs.offsets)
+
+
+def _costmap(messages: Messages) -> Decoded:
+    return _decode(messages, "metadata", "size_x", "size_y", cells_of_costs(messages))
 
 
 OCCUPANCY_GRID = Decoder("costmaps", _occupancy_grid)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
@@ -27,6 +28,7 @@ _NAMED = 6
 
 def map_figure(post: Postmortem, width_in: float) -> Figure | None:
     """Believed and hindsight path on the map; None where no path is known at all."""
+    post = _in_last_map(post)
     paths = [p for p in (_path(post, "hindsight"), _path(post, "belief")) if p is not None]
     alone = _path(post, "odometry") if not paths else None
     if alone is not None:
@@ -58,6 +60,27 @@ def map_figure(post: Postmortem, width_in: float) -> Figure | None:
     plane = float(np.clip((width_in - 0.75) * aspect, 1.8, 6.6))
     figure.set_size_inches(width_in, plane + around)
     return figure
+
+
+def _in_last_map(post: Postmortem) -> Postmortem:
+    """Without what cannot be drawn in the map at the end: the log was in another place then."""
+    hindsight, since = post.hindsight, post.drawn_from_ns
+    if hindsight is None or since == post.manifest.start_ns:
+        return post
+    changes, belief = hindsight.changes, post.belief
+    if changes is not None:
+        here = tuple(r for r in changes.regions if r.map_version is None)
+        changes = replace(changes, regions=here)
+    track = hindsight.track.take(hindsight.track.t_ns >= since)
+    stops = tuple(
+        replace(s, x_m=None, y_m=None) if s.t_ns < since else s for s in post.judgement.stops
+    )
+    return replace(
+        post,
+        hindsight=replace(hindsight, track=track, changes=changes),
+        belief=None if belief is None else belief.take(belief.t_ns >= since),
+        judgement=replace(post.judgement, stops=stops),
+    )
 
 
 def _path(post: Postmortem, name: str) -> se2.Array | None:
