@@ -87,30 +87,9 @@ class LogWriter:
 @pytest.fixture(scope="session")
 def type_stores():
     """rosbags' type stores of ROS 1 and ROS 2, with the types that they lack."""
-    from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+    from type_store import type_store
 
-    from slamreplay.ingest import DECODERS
-    from slamreplay.messages.definitions import DEFINITIONS
-    from slamreplay.messages.layouts import layouts
-
-    stores = {1: get_typestore(Stores.ROS1_NOETIC), 2: get_typestore(Stores.ROS2_HUMBLE)}
-    for store in stores.values():
-        for name, text in DEFINITIONS.items():
-            if name not in store.fielddefs:
-                store.register(get_types_from_msg(text, name))
-    for name in DECODERS:
-        if "/msg/" not in name:
-            register_layout(stores[2], name, layouts(name)[-1])
-    return stores
-
-
-def register_layout(store, name, text):
-    """Add a type in one of its layouts, with the types it needs, to a type store of ROS 2."""
-    from rosbags.typesys import get_types_from_msg
-
-    root, *others = get_types_from_msg(text, name).items()
-    wanted = {name: root[1], **dict(others)}  # rosbags knows no names of the form pkg/srv/X
-    store.register({k: v for k, v in wanted.items() if k not in store.fielddefs})
+    return {ros: type_store(ros) for ros in (1, 2)}
 
 
 @pytest.fixture

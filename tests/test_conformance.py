@@ -54,6 +54,25 @@ SCAN = {**ANGLES, "scan_time": 0.5, "range_min": 0.1, "range_max": 9.0, "intensi
 IMU = {"orientation": TURN, "angular_velocity": XYZ, "linear_acceleration": XYZ}
 IMU_COV = {f"{name}_covariance": COV9 for name in IMU}
 ERRORS = {"image_error": 0.1, "object_error": 0.1, "fiducial_area": 9.0}
+PLAIN_STAMP = {"timestamp": STAMP, "frame_id": "/f"}
+FOX_EDGE = {
+    "timestamp": STAMP,
+    "parent_frame_id": "/f",
+    "child_frame_id": "c",
+    "translation": XYZ,
+    "rotation": TURN,
+}
+FOX_FIX = {
+    **PLAIN_STAMP,
+    "latitude": 48.0,
+    "longitude": 0.0,
+    "altitude": 3.0,
+    "position_covariance": COV9,
+    "position_covariance_type": 0,
+}
+FOX_FIX_ROW = {"frame_id": "earth", "child_frame_id": "f", "kind": "gnss"}
+UNTURNED = {"position": {"x": 0.0, "y": 0.0, "z": 0.0}, "orientation": dict.fromkeys("xyzw", 0.0)}
+PACKED = [{"name": n, "offset": 4 * k, "type": 7} for k, n in enumerate("xyz")]
 VELOCITY = {"linear_velocity_xyz": [1, 2, 3], "angular_velocity_xyz": [4, 5, 6]}
 UUID, OTHER = {"uuid": (7,) * 16}, {"uuid": (8,) * 16}
 NO_GOALS = {"status_list": []}
@@ -63,6 +82,10 @@ PROGRESS = {"current_pose": {"header": HEADER, "pose": POSE}}
 ENDED = {"header": HEADER, "status": {"goal_id": GOAL_ID, "status": 3, "text": ""}}
 MBF_ENDED = {"dist_to_goal": 0.5, "angle_to_goal": 0.5}
 TARGET = {"target_pose": {"header": HEADER, "pose": POSE}}
+MARKER = {"header": HEADER, "id": 7, "pose": POSED, "confidence": 1.0}
+NODE = {"header": HEADER, "ns": "slam_toolbox", "type": 2, "action": 0, "points": []}
+DRIVE = {"speed": 1.5, "steering_angle": 0.2}
+DRIVEN = {"linear_velocity_xyz": [1.5, 0, 0], "angular_velocity_xyz": [0, 0, np.nan]}
 
 
 def feedback(goal_id, **fields):
@@ -125,6 +148,16 @@ DECODER_LINES = {
         {"ranges_m": [1, np.inf, 0], "angle_min_rad": -1, "range_max_m": 9},
         T,
     ),
+    "sensor_msgs/msg/MultiEchoLaserScan": (
+        {"header": HEADER, **SCAN, "ranges": [{"echoes": [2.0, 3.0]}, {"echoes": []}]},
+        {"ranges_m": [2, np.nan], "angle_min_rad": -1, "frame_id": "f"},
+        T,
+    ),
+    "sensor_msgs/msg/PointCloud": (
+        {"header": HEADER, "points": [XYZ], "channels": []},
+        {"points_xyz": [1, 2, 3], "frame_id": "f"},
+        T,
+    ),
     "sensor_msgs/msg/PointCloud2": (
         {"header": HEADER, **CLOUD, "row_step": 12, "data": XYZ_BYTES},
         {"points_xyz": [1, 2, 3]},
@@ -138,6 +171,15 @@ DECODER_LINES = {
     "geometry_msgs/msg/PoseStamped": (
         {"header": HEADER, "pose": POSE},
         {**PLACED, "covariance": [np.nan] * 36},
+        T,
+    ),
+    "nav2_msgs/srv/SetInitialPose_Event": (
+        {
+            "info": {"event_type": 1, "stamp": STAMP},
+            "request": [{"pose": {"header": HEADER, "pose": POSED}}],
+            "response": [],
+        },
+        {**PLACED, "covariance": COV36},
         T,
     ),
     "geometry_msgs/msg/PoseArray": (
@@ -169,6 +211,57 @@ DECODER_LINES = {
         {**PLACED, "child_frame_id": "tag_7", "covariance": COV36},
         T,
     ),
+    "isaac_ros_apriltag_interfaces/msg/AprilTagDetectionArray": (
+        {
+            "header": HEADER,
+            "detections": [{"family": "36h11", "id": 7, "pose": {"header": HEADER, "pose": POSED}}],
+        },
+        {**PLACED, "child_frame_id": "tag_7", "covariance": COV36},
+        T,
+    ),
+    "aruco_msgs/msg/MarkerArray": (
+        {"header": HEADER, "markers": [MARKER]},
+        {**PLACED, "child_frame_id": "tag_7", "covariance": COV36},
+        T,
+    ),
+    "aruco_msgs/msg/Marker": (
+        MARKER,
+        {**PLACED, "child_frame_id": "tag_7", "covariance": COV36},
+        T,
+    ),
+    "ros2_aruco_interfaces/msg/ArucoMarkers": (
+        {"header": HEADER, "marker_ids": [7], "poses": [POSE]},
+        {**PLACED, "child_frame_id": "tag_7", "kind": "fiducial"},
+        T,
+    ),
+    "aruco_interfaces/msg/ArucoMarkers": (
+        {"header": HEADER, "marker_ids": [7], "poses": [POSE]},
+        {**PLACED, "child_frame_id": "tag_7", "kind": "fiducial"},
+        T,
+    ),
+    "ar_track_alvar_msgs/msg/AlvarMarkers": (
+        {
+            "header": {"stamp": {"sec": 0, "nanosec": 0}, "frame_id": ""},
+            "markers": [{"header": HEADER, "id": 7, "pose": {"header": HEADER, "pose": POSE}}],
+        },
+        {**PLACED, "child_frame_id": "tag_7", "kind": "fiducial"},
+        T,
+    ),
+    "cartographer_ros_msgs/msg/LandmarkList": (
+        {
+            "header": HEADER,
+            "landmark": [
+                {
+                    "id": "7",
+                    "tracking_from_landmark_transform": POSE,
+                    "translation_weight": 1.0,
+                    "rotation_weight": 1.0,
+                }
+            ],
+        },
+        {**PLACED, "child_frame_id": "tag_7", "covariance": [np.nan] * 36},
+        T,
+    ),
     "sensor_msgs/msg/NavSatFix": (
         {
             "header": HEADER,
@@ -189,6 +282,19 @@ DECODER_LINES = {
     ),
     "tf2_msgs/msg/TFMessage": ({"transforms": [TF]}, EDGE, T),
     "tf/msg/tfMessage": ({"transforms": [TF]}, EDGE, T),
+    "std_msgs/msg/Float32": ({"data": 0.5}, {"value": 0.5}, None),
+    "std_msgs/msg/Float64": ({"data": 0.5}, {"value": 0.5}, None),
+    "geometry_msgs/msg/Vector3Stamped": (
+        {"header": HEADER, "vector": XYZ},
+        {"name": "x", "value": 1},
+        T,
+    ),
+    "autoware_internal_debug_msgs/msg/Float32Stamped": (
+        {"stamp": STAMP, "data": 0.5},
+        {"value": 0.5},
+        T,
+    ),
+    "tier4_debug_msgs/msg/Float32Stamped": ({"stamp": STAMP, "data": 0.5}, {"value": 0.5}, T),
     "nav_msgs/msg/OccupancyGrid": (
         {"header": HEADER, "info": GRID, "data": [0, 100]},
         {"cells": [0, 100], "width": 2, "origin_xyyaw": [1, 2, YAW]},
@@ -205,7 +311,34 @@ DECODER_LINES = {
         T,
     ),
     "geometry_msgs/msg/Twist": (TWIST, VELOCITY, None),
-    "geometry_msgs/msg/TwistStamped": ({"header": HEADER, "twist": TWIST}, VELOCITY, T),
+    "geometry_msgs/msg/TwistStamped": (
+        {"header": HEADER, "twist": TWIST},
+        {**VELOCITY, "frame_id": "f", "twist_covariance": [np.nan] * 36},
+        T,
+    ),
+    "geometry_msgs/msg/TwistWithCovarianceStamped": (
+        {"header": HEADER, "twist": {"twist": TWIST, "covariance": COV36}},
+        {**VELOCITY, "frame_id": "f", "twist_covariance": COV36},
+        T,
+    ),
+    "sensor_msgs/msg/JointState": (
+        {
+            "header": HEADER,
+            "name": ["left", "right"],
+            "position": [1.0, 2.0],
+            "velocity": [3.0, 4.0],
+            "effort": [],
+        },
+        {"name": "left", "position": 1, "velocity": 3, "effort": np.nan},
+        T,
+    ),
+    "sensor_msgs/msg/MagneticField": (
+        {"header": HEADER, "magnetic_field": XYZ, "magnetic_field_covariance": COV9},
+        {"magnetic_field_xyz": [1, 2, 3], "magnetic_field_covariance": COV9, "frame_id": "f"},
+        T,
+    ),
+    "ackermann_msgs/msg/AckermannDrive": (DRIVE, DRIVEN, None),
+    "ackermann_msgs/msg/AckermannDriveStamped": ({"header": HEADER, "drive": DRIVE}, DRIVEN, T),
     "nav2_msgs/msg/BehaviorTreeLog": (
         {"timestamp": STAMP, "event_log": [SPIN]},
         {"name": "Spin", "status": "running", "source": "behavior_tree"},
@@ -281,12 +414,6 @@ DECODER_LINES = {
         T,
         {"topic": "/reinitialize_global_localization/_service_event", "after": event(2)},
     ),
-    "nav2_msgs/srv/SetInitialPose_Event": (
-        event(1, [{"pose": {"header": HEADER, "pose": POSED}}]),
-        {"position_xyz": [1, 2, 3], "orientation_xyzw": [0, 0, 0.6, 0.8], "covariance": COV36},
-        T,
-        {"after": event(2)},
-    ),
     "move_base_msgs/msg/MoveBaseActionGoal": (
         {"header": HEADER, "goal_id": GOAL_ID, "goal": TARGET},
         {"name": "move_base", "status": "pending", "goal": "g"},
@@ -350,8 +477,163 @@ DECODER_LINES = {
         T,
         {"after": {"header": HEADER, "percentage": True, "speed_limit": 0.0}},
     ),
+    "diagnostic_msgs/msg/DiagnosticStatus": (
+        {"level": b"\x02", "name": "n", "message": "hot", "values": []},
+        {"level": 2, "name": "n", "message": "hot"},
+        None,
+    ),
+    "sensor_msgs/msg/BatteryState": (
+        {"header": HEADER, "power_supply_status": 1, "current": 2.0, "location": ""},
+        {"level": 20, "name": "battery", "message": "charging"},
+        T,
+    ),
+    "rcl_interfaces/msg/ParameterEvent": (
+        {
+            "stamp": STAMP,
+            "node": "/amcl",
+            "new_parameters": [],
+            "changed_parameters": [
+                {"name": "max_beams", "value": {"type": 2, "integer_value": 60}},
+            ],
+            "deleted_parameters": [],
+        },
+        {"level": 20, "name": "/amcl: max_beams", "message": "set to 60"},
+        T,
+    ),
+    "dynamic_reconfigure/msg/Config": (
+        {
+            "bools": [{"name": "on", "value": True}],
+            "ints": [],
+            "strs": [],
+            "doubles": [],
+            "groups": [],
+        },
+        {"level": 20, "name": ": on", "message": "set to true"},
+        None,
+    ),
+    "lifecycle_msgs/msg/TransitionEvent": (
+        {
+            "timestamp": 0,
+            "transition": {"id": 3, "label": "activate"},
+            "start_state": {"id": 2, "label": "inactive"},
+            "goal_state": {"id": 3, "label": "active"},
+        },
+        {"level": 20, "message": "inactive -> active"},
+        None,
+    ),
+    "rtabmap_msgs/msg/Info": (
+        {
+            "header": HEADER,
+            "ref_id": 12,
+            "loop_closure_id": 3,
+            "proximity_detection_id": 0,
+            "landmark_id": 0,
+            "stats_keys": ["Loop/Highest_hypothesis_id/", "Loop/Highest_hypothesis_value/"],
+            "stats_values": [3.0, 0.5],
+        },
+        {"kind": "loop_closure", "from_id": "12", "to_id": "3", "score": 0.5, "frame_id": "f"},
+        T,
+    ),
+    "rtabmap_ros/msg/Info": (
+        {
+            "header": HEADER,
+            "refId": 12,
+            "loopClosureId": 0,
+            "proximityDetectionId": 4,
+            "statsKeys": [],
+            "statsValues": [],
+        },
+        {"kind": "proximity", "from_id": "12", "to_id": "4", "score": np.nan},
+        T,
+    ),
+    "visualization_msgs/msg/MarkerArray": (
+        {
+            "markers": [
+                {**NODE, "id": 1, "pose": {"position": {"x": 0.0, "y": 0.0, "z": 0.0}}},
+                {**NODE, "id": 9, "pose": {"position": {"x": 1.0, "y": 2.0, "z": 3.0}}},
+                {
+                    **NODE,
+                    "id": 0,
+                    "type": 5,
+                    "pose": POSE,
+                    "points": [XYZ, {"x": 0.0, "y": 0.0, "z": 0.0}],
+                },
+            ]
+        },
+        {"kind": "link", "from_id": "9", "to_id": "1", "from_xyz": [1, 2, 3], "number": 0},
+        T,
+    ),
+    "rosgraph_msgs/msg/Clock": ({"clock": STAMP}, {"clock_ns": T}, None),
     "rcl_interfaces/msg/Log": ({"stamp": STAMP, **LOG}, {"level": 4, "message": "text"}, T),
     "rosgraph_msgs/msg/Log": ({"header": HEADER, **LOG}, {"level": 4, "message": "text"}, T),
+    "foxglove_msgs/msg/PoseInFrame": (
+        {**PLAIN_STAMP, "pose": POSE},
+        {**PLACED, "covariance": [np.nan] * 36},
+        T,
+    ),
+    "foxglove_msgs/msg/PosesInFrame": (
+        {**PLAIN_STAMP, "poses": [POSE, POSE]},
+        {"xyyaw": [1, 2, YAW] * 2, "weights": [], "frame_id": "f"},
+        T,
+    ),
+    "foxglove_msgs/msg/FrameTransform": (FOX_EDGE, EDGE, T),
+    "foxglove_msgs/msg/FrameTransforms": ({"transforms": [FOX_EDGE]}, EDGE, T),
+    "foxglove_msgs/msg/Odometry": (
+        {
+            **PLAIN_STAMP,
+            "body_frame_id": "/b",
+            "pose": POSE,
+            "linear_velocity": XYZ,
+            "angular_velocity": TWIST["angular"],
+            "pose_covariance": COV36,
+            "velocity_covariance": COV36,
+        },
+        {**PLACED, **VELOCITY, "child_frame_id": "b", "twist_covariance": COV36},
+        T,
+    ),
+    "foxglove_msgs/msg/LaserScan": (
+        {
+            **PLAIN_STAMP,
+            "pose": UNTURNED,
+            "start_angle": -1.0,
+            "end_angle": 1.0,
+            "ranges": [1.0, float("inf"), 4.0],
+        },
+        {"ranges_m": [1, np.inf, 4], "angle_increment_rad": 1, "range_max_m": 4, "frame_id": "f"},
+        T,
+    ),
+    "foxglove_msgs/msg/PointCloud": (
+        {
+            **PLAIN_STAMP,
+            "pose": UNTURNED,
+            "point_stride": 12,
+            "fields": PACKED,
+            "data": XYZ_BYTES,
+        },
+        {"points_xyz": [1, 2, 3], "frame_id": "f"},
+        T,
+    ),
+    "foxglove_msgs/msg/Grid": (
+        {
+            **PLAIN_STAMP,
+            "pose": POSE,
+            "column_count": 2,
+            "cell_size": {"x": 0.5, "y": 0.5},
+            "row_stride": 5,
+            "cell_stride": 2,
+            "fields": [{"name": "occupancy", "offset": 1, "type": 1}],
+            "data": [7, 0, 7, 100, 7, 7, 255, 7, 65, 7],
+        },
+        {"cells": [0, 100, -1, 65], "width": 2, "height": 2, "origin_xyyaw": [1, 2, YAW]},
+        T,
+    ),
+    "foxglove_msgs/msg/LocationFix": (FOX_FIX, FOX_FIX_ROW, T),
+    "foxglove_msgs/msg/LocationFixes": ({"fixes": [FOX_FIX]}, FOX_FIX_ROW, T),
+    "foxglove_msgs/msg/Log": (
+        {"timestamp": STAMP, "level": 4, "name": "n", "message": "text"},
+        {"level": 4, "name": "n", "message": "text"},
+        T,
+    ),
 }
 
 

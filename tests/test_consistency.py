@@ -390,6 +390,7 @@ def test_covariances_that_are_none_are_counted():
         ([(0, 0), (9, 9)], None, ""),
         ([(0, 0), (50 * SECOND, 49 * SECOND)], "warning", "speeds"),
         ([(600_000 * SECOND, 0)], "info", "epoch"),
+        ([(7 * SECOND, 976_052_857 * SECOND)], "info", "when the recorder was started"),
         (None, "warning", "stamps are zero"),
     ],
 )

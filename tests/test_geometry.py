@@ -32,6 +32,12 @@ def test_compose_agrees_with_gtsam(a, b):
     assert abs(se2.wrap_angle(got[2] - expected.theta())) < 1e-9
 
 
+def test_quaternion_beyond_float64_becomes_nan():
+    unit, sound = se3.unit_quaternion([[1e200, 0, 0, 1e200], [np.inf, 0, 0, 0]])
+    assert np.isnan(unit).all()
+    assert not sound.any()
+
+
 @given(pose)
 def test_planar_undoes_from_planar(a):
     np.testing.assert_allclose(se3.planar(se3.from_planar(a)), a, atol=1e-9)

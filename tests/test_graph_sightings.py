@@ -1,5 +1,7 @@
 """Landmarks and position fixes in the pose graph: what they must tie, and what they must not."""
 
+from dataclasses import replace
+
 import gtsam
 import numpy as np
 import pytest
@@ -82,6 +84,54 @@ def test_surveyed_landmarks_alone_place_the_run_in_the_map():
     found, _ = smooth(se2.compose(shift, poses), motions, seen=seen)
 
     assert np.hypot(*(found - truth)[:, :2].T).max() < 0.1
+
+
+def as_points(seen):
+    """The sightings without headings."""
+    xyyaw, initial = seen.xyyaw.copy(), seen.initial.copy()
+    xyyaw[:, 2], initial[:, 2] = np.nan, np.nan
+    return replace(seen, xyyaw=xyyaw, initial=initial)
+
+
+@pytest.mark.parametrize("known", [False, True])
+def test_points_bound_the_drift_without_a_heading(known):
+    truth = loop()
+    motions, poses = drifting(truth)
+    marks = np.array([[6.0, 0.5, 0.3], [4.0, -2.0, 0.0]])
+    anchors = NO_ANCHORS if known else anchored(truth, [0])
+    alone = smooth(poses, motions, anchors=anchors)[0]
+    seen = as_points(sightings(truth, poses, [0, 1, 38, 39], marks, known=known))
+    tied, cov = smooth(poses, motions, anchors=anchors, seen=seen)
+
+    assert np.hypot(*(alone - truth)[-1, :2]) > 1.0
+    assert np.hypot(*(tied - truth)[-1, :2]) < 0.15
+    assert np.sqrt(cov[-1, 0, 0]) < 0.1
+
+
+def test_the_covariance_of_a_point_is_that_of_its_x_and_y():
+    """One pose, two surveyed points: oracle is the linear estimate of the pose from x and y."""
+    truth = np.array([[1.0, 2.0, 0.7], [1.5, 2.4, 0.7]])
+    motions = se2.between(truth[:-1], truth[1:])
+    marks = np.array([[4.0, 3.0, np.nan], [0.0, 6.0, np.nan], [-3.0, 1.0, np.nan]])
+    seen = se2.between(truth[[0, 0, 0]], np.nan_to_num(marks))
+    seen[:, 2] = np.nan
+    cov = np.tile(np.diag([0.04, 0.09, 1.0]), (3, 1, 1))
+    things = Sightings(np.zeros(3, dtype=int), np.arange(3), seen, cov, marks, np.ones(3, bool))
+    found, spread = smooth(truth, motions, seen=things)
+
+    c, s = np.cos(0.7), np.sin(0.7)
+    R = np.array([[c, -s], [s, c]])
+    information = np.diag(1.0 / np.array([2.0, 2.0, 1.0]) ** 2)
+    for x, y, _ in seen:
+        # x and y in the robot's axes, by its place (along these axes) and its heading.
+        J = np.array([[-1.0, 0.0, y], [0.0, -1.0, -x]])
+        noise = cov[0, :2, :2] + R.T @ np.diag([0.03**2, 0.03**2]) @ R
+        information += J.T @ np.linalg.inv(noise) @ J
+    body = np.linalg.inv(information)
+
+    np.testing.assert_allclose(found[0], truth[0], atol=1e-6)
+    np.testing.assert_allclose(spread[0, :2, :2], R @ body[:2, :2] @ R.T, rtol=0.02, atol=1e-4)
+    np.testing.assert_allclose(spread[0, 2, 2], body[2, 2], rtol=0.02)
 
 
 def test_one_sighting_of_another_tag_under_the_same_name_is_given_up():

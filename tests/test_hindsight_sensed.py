@@ -84,6 +84,12 @@ def seeing(view, tags, seconds, *, camera=CAMERA, in_tf=True, far=4.0, kind="fid
     return with_edge(view, "base_link", "camera", camera) if in_tf else view
 
 
+def as_points(view):
+    """The view without what its sightings say of how a thing is turned."""
+    table = view.table("references")
+    return view.with_table(table.replace(orientation_xyzw=np.full((len(table), 4), np.nan)))
+
+
 def with_edge(view, parent, child, T):
     edge = rows(
         "transforms", np.zeros(1), parent_frame=names(parent, 1), child_frame=names(child, 1),
@@ -125,6 +131,19 @@ def test_a_surveyed_tag_tells_two_like_places_apart(alike, is_mirrored):
     assert found.joined["fiducial"] > 5
 
 
+@pytest.mark.parametrize("is_mirrored", [False, True])
+def test_surveyed_points_tell_two_like_places_apart_too(alike, is_mirrored):
+    view = as_points(seeing(alike, TAGS, 20.0))
+    for name, T in TAGS.items():
+        turned = T @ se3.from_planar(np.array([0.0, 0.0, 1.3]))  # what a survey says of a heading
+        view = with_edge(view, "map", name, mirrored(turned) if is_mirrored else turned)
+    found = hindsight(view)
+
+    assert (np.median(misses(found)) > 1.0) == is_mirrored
+    assert found.margin > 0.03
+    assert found.joined["fiducial"] > 5
+
+
 def test_tags_at_unknown_places_move_along_with_the_room_and_prove_nothing(alike):
     without, found = hindsight(alike), hindsight(seeing(alike, TAGS, 20.0))
 
@@ -148,6 +167,26 @@ def test_tags_and_docks_do_not_harm_a_healthy_log(healthy):
         np.percentile(misses(found), 95)
         < np.percentile(misses(hindsight(healthy.view())), 95) + 0.01
     )
+
+
+def test_points_at_unknown_places_do_not_harm_a_healthy_log(healthy):
+    found = hindsight(as_points(seeing(healthy.view(), TAGS, 20.0)))
+
+    assert set(found.joined) == {"fiducial"}
+    assert np.percentile(misses(found), 95) < 0.05
+
+
+def test_nothing_takes_an_orientation_that_was_not_sensed(healthy):
+    view = seeing(healthy.view(), TAGS, 20.0)
+    surveyed = with_edge(view, "map", "tag_1", TAGS["tag_1"])
+    with_heading = sightings_of(surveyed, odometry_track(view))
+    points = sightings_of(as_points(surveyed), odometry_track(view))
+
+    np.testing.assert_array_equal(points.xyyaw[:, :2], with_heading.xyyaw[:, :2])
+    assert np.isnan(points.xyyaw[:, 2]).all()
+    assert np.isnan(points.surveyed["fiducial tag_1"][2])
+    np.testing.assert_array_equal(points.cov[:, :2, :2], with_heading.cov[:, :2, :2])
+    np.testing.assert_allclose(np.sqrt(points.cov[:, 2, 2]), np.pi / np.sqrt(3.0))
 
 
 def test_references_that_only_judge_change_no_bit(healthy):
@@ -244,6 +283,14 @@ def seen_by(keys, xyyaw, surveyed=(np.nan, np.nan, np.nan)):
         np.tile(np.eye(3) * 0.01, (len(keys), 1, 1)), ("fiducial tag_1",), np.array([surveyed]),
         empty, np.empty((0, 3)), np.empty((0, 2)), np.empty((0, 2, 2)),
     )  # fmt: skip
+
+
+def test_a_surveyed_point_is_a_known_landmark_without_a_heading():
+    seen = seen_by([0, 1], [[2.0, 1.0, np.nan]] * 2, (4.0, 3.0, np.nan))
+    landmarks, _ = seen.constraints(np.zeros((2, 3)))
+
+    assert landmarks.known.tolist() == [True]
+    np.testing.assert_array_equal(landmarks.initial, [[4.0, 3.0, np.nan]])
 
 
 CARRIED = (np.tile([30.0, 30.0, 0.0], (2, 1)), np.full(2, 8.0))

@@ -139,7 +139,7 @@ def test_columns_that_wait_on_disk_give_the_same_bytes(logs, robot, tmp_path, mo
     messages = [m for k in range(40) for m in robot.messages()[k::40]]  # not in the order of time
     paths = [logs.write("a.mcap", messages[::2]), logs.write("b.mcap", messages[1::2])]
     one = ingest(paths, tmp_path / "one" / "b")
-    monkeypatch.setattr("slamreplay.ingest.rows.MEMORY_BYTES", 2000)
+    monkeypatch.setattr("slamreplay.ingest.collected.MEMORY_BYTES", 2000)
     monkeypatch.setattr("slamreplay.ingest.readers.windows.WINDOW_BYTES", 3000)
     files = []
     real = np.memmap

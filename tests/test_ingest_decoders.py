@@ -10,6 +10,7 @@ from slamreplay.ingest import DECODERS
 from slamreplay.ingest.decoders.decoder import Messages
 from slamreplay.ingest.decoders.grid import COST_SCALE
 from slamreplay.messages.definitions import LATER_DEFINITIONS
+from slamreplay.messages.interfaces import as_message
 
 T_LOG = np.array([10, 20, 30], dtype=np.int64)
 
@@ -53,9 +54,8 @@ def random_message(logs):
 def test_every_decoder_fills_the_columns_of_its_table(logs):
     times = {"t_ns", "t_sensor_ns", "t_log_ns", "topic"}
     for kind in DECODERS:
-        if kind == "rosgraph_msgs/msg/Log":
-            continue  # ROS 1 only
-        decoded = decode(kind, logs.make(kind))
+        ros = 2 if as_message(kind) in logs.stores[2].fielddefs else 1
+        decoded = decode(kind, logs.make(as_message(kind), ros))
         schema = TABLES[DECODERS.load(kind).table]
         assert set(decoded.columns) == {c.name for c in schema.columns} - times, kind
         assert len(decoded.rows) == len(decoded.t_sensor_ns), kind
@@ -266,7 +266,7 @@ def test_behavior_tree_log_with_uid_is_read_from_its_own_definition(logs):
     path = logs.write("bt.mcap", [("/bt", "nav2_msgs/msg/BehaviorTreeLog", log, 1)])
 
     from slamreplay.ingest.readers.open_log import open_log
-    from slamreplay.ingest.rows import read_rows
+    from slamreplay.ingest.reading import read_rows
 
     with open_log([path]) as (readers, _):
         (topic,), losses = read_rows(readers, lambda _topic: None, None)

@@ -28,13 +28,14 @@ EXPECTED = {
             "scan": "/driver_laser_navigation/laser_scan", "pose": "/tf",
             "scan_2": "/driver_laser_security/laser_scan",
             "reference": "/pose_ground_truth", "command": "/cmd_vel",
+            "points": "/driver_laser_navigation/beacons_scan",
         },
     ),
     "inesctec_jarvis/guardian_3.bag": (
         (None, "odom", "base_footprint"),
         {
             "odometry": "/guardian_node/odom", "scan": "/scan", "scan_2": "/hokuyo_back_scan",
-            "command": "/guardian_node/command",
+            "command": "/guardian_node/command", "joints": "/joint_states",
         },
     ),
     "olin_neato/ac109_3_demo.bag": (
@@ -42,6 +43,7 @@ EXPECTED = {
         {
             "odometry": "/odom", "scan": "/scan", "pose": "/tf", "map": "/map",
             "particles": "/particlecloud", "initial_pose": "/initialpose", "command": "/cmd_vel",
+            "points": "/projected_stable_scan", "clock": "/clock",
         },
     ),
     TB4: (
@@ -60,7 +62,7 @@ EXPECTED = {
         ("map", None, None),
         {
             "pose": "/amcl_pose", "covariance": "/amcl_pose",
-            "reference": "/base_pose_ground_truth",
+            "reference": "/base_pose_ground_truth", "clock": "/clock",
         },
     ),
     "jackal/test_2026-02-17-15-54-31.bag": (
@@ -69,7 +71,10 @@ EXPECTED = {
     ),
     "fixtures/turtlebot3_no_tf.bag": (
         (None, "odom", "base_footprint"),
-        {"odometry": "/odom", "scan": "/scan", "imu": "/imu", "command": "/cmd_vel"},
+        {
+            "odometry": "/odom", "scan": "/scan", "imu": "/imu", "command": "/cmd_vel",
+            "joints": "/joint_states",
+        },
     ),
 }  # fmt: skip
 

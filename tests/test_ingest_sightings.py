@@ -43,6 +43,8 @@ def bundle(logs, tmp_path):
             ("/odometry/gps", ODOM, stamped(logs, ODOM, step, **odometry), t),
             ("/detected_dock_pose", POSE, stamped(logs, POSE, step, **pose), t),
             ("/staging_pose", POSE, stamped(logs, POSE, step, **pose), t),
+            ("/r1/dock_pose", POSE, stamped(logs, POSE, step, **pose), t),
+            ("/filtered_dock_pose", POSE, stamped(logs, POSE, step, **pose), t),
             ("/fix", FIX, stamped(logs, FIX, step), t),
         ]
     return ingest([logs.write("log.mcap", messages)], tmp_path / "b")
@@ -64,7 +66,10 @@ def test_sensed_docks_are_measurements_and_staging_poses_are_not(bundle):
 
     assert set(rows["topic"]) == {"/detected_dock_pose"}
     assert set(rows["child_frame_id"]) == {"dock"}
-    assert "/staging_pose" in {x.what for x in bundle.manifest.losses}
+    reasons = {x.what: (x.count, x.reason.partition(":")[0]) for x in bundle.manifest.losses}
+    assert reasons["/staging_pose"] == (9, "where docking begins")
+    assert reasons["/r1/dock_pose"] == (9, "where docking takes the dock to be")
+    assert reasons["/filtered_dock_pose"] == (9, "detections of the dock, smoothed")
 
 
 def test_gnss_is_neither_odometry_nor_belief_and_a_fix_is_a_measurement(bundle):
@@ -115,9 +120,52 @@ def test_fixes_without_bounds_are_counted_and_covariances_without_bounds_not_kno
     assert [x.count for x in bundle.manifest.losses if x.what == "/fix"] == [2]
 
 
+def test_types_that_tell_nothing_here_are_counted_with_a_reason(logs, tmp_path):
+    kinds = ("apriltag_msgs/msg/AprilTagDetectionArray", "fiducial_msgs/msg/FiducialArray",
+             "nav_msgs/msg/MapMetaData")  # fmt: skip
+    odometry = stamped(logs, ODOM, 0, header__frame_id="odom", pose__pose__orientation__w=1.0)
+    messages = [("/odom", ODOM, odometry, 10**18)]
+    messages += [(f"/t{k}", kind, logs.make(kind), 10**18 + k) for k, kind in enumerate(kinds)]
+
+    bundle = ingest([logs.write("log.db3", messages)], tmp_path / "b")
+
+    losses = {x.what: (x.kind, x.count, x.reason) for x in bundle.manifest.losses}
+    assert losses == {
+        f"/t0 ({kinds[0]})": (
+            "skipped", 1, "tags without a pose: apriltag_ros puts their poses on tf",
+        ),
+        f"/t1 ({kinds[1]})": ("skipped", 1, "corners of tags in an image, without a pose"),
+        f"/t2 ({kinds[2]})": ("skipped", 1, "size and origin of a map, without its cells"),
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize(("frame", "kept"), [("tag_7", "/markers"), ("36h11:7", "/tf")])
+def test_a_tag_told_in_a_message_and_on_tf_was_seen_once(logs, tmp_path, frame, kept):
+    markers, odom = "aruco_msgs/msg/MarkerArray", ("odom", "base_link")
+    messages = []
+    for step in range(4):
+        t = (1_700_000_000 * SECOND) + step * 10**8
+        place = {"pose__pose__position__x": 1.0 + step, "pose__pose__orientation__w": 1.0}
+        marker = logs.make("aruco_msgs/msg/Marker", id=7, confidence=1.0, **place)
+        seen = stamped(logs, markers, step, header__frame_id="camera", markers=[marker])
+        edges = [edge(logs, step, *odom), edge(logs, step, "camera", frame, 1.0 + step)]
+        messages += [
+            ("/tf", TF, logs.make(TF, transforms=edges), t),
+            ("/markers", markers, seen, t),
+        ]
+
+    bundle = ingest([logs.write("log.mcap", messages)], tmp_path / "b")
+
+    rows = bundle.table("references")
+    assert (rows["topic"].tolist(), set(rows["child_frame_id"])) == ([kept] * 4, {frame})
+    (loss,) = [x for x in bundle.manifest.losses if x.kind == "skipped"]
+    assert (loss.count, loss.reason) == (4, "tags told twice, in a message and on tf")
+
+
 @pytest.mark.parametrize(
     ("frame", "is_tag"),
-    [("tag_0", True), ("/tag36h11:12", True), ("robot/fiducial_3", True), ("tag", False),
+    [("tag_0", True), ("/tag36h11:12", True), ("36h11:0", True), ("41h12:3", True),
+     ("4h:3", False), ("robot/fiducial_3", True), ("tag", False),
      ("stage_0", False), ("camera_tag_mount", False), ("laser_2", False)],
 )  # fmt: skip
 def test_names_of_tag_frames(frame, is_tag):

@@ -1,18 +1,17 @@
 """Columns read from bytes are what rosbags reads message by message, for every type we decode."""
 
-from functools import cache
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from rosbags.interfaces import Nodetype
-from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+from rosbags.typesys import get_types_from_msg
+from type_store import type_store
 
 from slamreplay.ingest import DECODERS
 from slamreplay.ingest.wire.layout import Number, Struct, Text, layout_of
 from slamreplay.ingest.wire.read import read_messages
-from slamreplay.messages.definitions import DEFINITIONS, LATER_DEFINITIONS
+from slamreplay.messages.interfaces import as_message
 
 #: Layouts that alignment makes awkward: what real types have only here and there, all at once.
 ODD = {
@@ -26,14 +25,12 @@ ODD = {
         "odd/Tail[2] pair\nint8[] bytes\nint64 last\n"
     ),
 }
-NAMES = sorted(n for n in {*DECODERS, "odd/msg/All"} if not n.startswith("foxglove"))
+NAMES = sorted(as_message(n) for n in {*DECODERS, "odd/msg/All"} if not n.startswith("foxglove"))
 
 
-@cache
 def store(ros, *, later=False):
-    found = get_typestore(Stores.ROS1_NOETIC if ros == 1 else Stores.ROS2_HUMBLE)
-    shipped = DEFINITIONS | (LATER_DEFINITIONS if later else {}) | ODD
-    for name, text in shipped.items():
+    found = type_store(ros, later=later)
+    for name, text in ODD.items():
         if name not in found.fielddefs:
             found.register(get_types_from_msg(text, name))
     return found
@@ -124,6 +121,9 @@ def assert_same_field(messages, values, node, at):
     else:
         children, rows = messages.children(at)
         assert rows.tolist() == [k for k, v in enumerate(values) for _ in v]
+        if isinstance(node.element, Text):
+            ragged = messages.ragged(at, object)
+            assert [list(ragged[k]) for k in range(len(values))] == [list(v) for v in values]
         assert_same_field(children, [e for v in values for e in v], node.element, "")
 
 

@@ -22,6 +22,8 @@ KINDS = ("fiducial", "dock")
 _NEAR_M, _PER_M, _YAW = 0.03, 0.04, 0.1
 #: An axis of a tag that is this much less level than its most level one is no heading.
 _LEVEL = 0.9
+#: Variance of a heading that may be anything, rad^2: uniform over the circle.
+_ANY_HEADING = np.pi**2 / 3.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,9 +35,10 @@ class Sightings:
         kind: (N,) fiducial or dock.
         name: (N,) which one, its kind included: "fiducial tag_3".
         xyyaw: (N, 3) the thing in the robot's base, m, m, rad; the heading is that of its most
-            level axis.
+            level axis, NaN where the sensor does not tell it.
         cov: (N, 3, 3) in the base's axes, m^2 and rad^2.
-        surveyed: poses (3,) in the map of the things whose place the log itself states.
+        surveyed: poses (3,) in the map of the things whose place the log itself states; a heading
+            that is never sensed is NaN here too.
     """
 
     t_ns: NDArray[np.int64]
@@ -81,12 +84,14 @@ def sightings_of(view: BundleView, motion: PoseTrack) -> Sightings | None:
     T = T_base_frame[known] @ T_frame_thing[known]
     surveys = _surveys(view.transforms, map_frame, table.take(known), names[known])
     yaw, surveyed = _headings(T, names[known], surveys)
+    cov = _covariance(table["covariance"][known], T_base_frame[known, :3, :3], T[:, :2, 3])
+    cov[np.isnan(yaw), 2, 2] = _ANY_HEADING
     return Sightings(
         table.t_ns[known],
         table["kind"][known],
         names[known],
         np.column_stack([T[:, :2, 3], yaw]),
-        _covariance(table["covariance"][known], T_base_frame[known, :3, :3], T[:, :2, 3]),
+        cov,
         surveyed,
     )
 
@@ -132,12 +137,18 @@ def _headings(
 ) -> tuple[se2.Array, dict[str, se2.Array]]:
     """Headings (N,) of each thing's most level axis, and the surveyed planar poses.
 
-    A tag on the ceiling has its x axis level, one on a wall may have it upright.
+    A tag on the ceiling has its x axis level, one on a wall may have it upright. What is sensed as
+    a point, even once, has no heading, and whatever its survey says of one has no counterpart.
     """
     yaw, planar = np.zeros(len(T)), {}
     level = np.hypot(T[:, 0, :3], T[:, 1, :3])
     for name in sorted(set(names)):
         rows = names == name
+        if not np.isfinite(level[rows]).all():
+            yaw[rows] = np.nan
+            if name in surveys:
+                planar[name] = np.array([*surveys[name][:2, 3], np.nan])
+            continue
         mean = level[rows].mean(axis=0)
         axis = int(np.flatnonzero(mean >= _LEVEL * mean.max())[0])
         yaw[rows] = np.arctan2(T[rows, 1, axis], T[rows, 0, axis])
@@ -157,8 +168,9 @@ def _covariance(covariance: se2.Array, R: se2.Array, xy: se2.Array) -> se2.Array
     full = np.where(np.isfinite(covariance), covariance, np.nan).reshape(-1, 6, 6)
     position = (R @ full[:, :3, :3] @ np.swapaxes(R, 1, 2))[:, :2, :2]
     turn = (R @ full[:, 3:, 3:] @ np.swapaxes(R, 1, 2))[:, 2, 2]
-    told = np.isfinite(position).all(axis=(1, 2)) & np.isfinite(turn) & (turn > 0.0)
+    told: NDArray[np.bool_] = np.asarray(np.isfinite(position).all(axis=(1, 2)))
     told[told] = np.linalg.eigvalsh(position[told])[:, 0] > 0.0
     out[told, :2, :2] += position[told]
+    told = np.isfinite(turn) & (turn > 0.0)  # a reflector has a place and no heading
     out[told, 2, 2] += turn[told]
     return out

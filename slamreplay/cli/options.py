@@ -20,7 +20,8 @@ Logs = Annotated[
     list[Path],
     typer.Argument(
         metavar="LOG...",
-        help="ROS 1 .bag, rosbag2 folder, .mcap or .db3 (several are one log), or one bundle.",
+        help="ROS 1 .bag, rosbag2 folder, .mcap or .db3 (several are one log); or one CARMEN .clf "
+        "(.gz, .bz2), MRCLAM folder or bundle.",
     ),
 ]
 MapYaml = Annotated[
@@ -33,7 +34,7 @@ Topics = Annotated[
 ]
 Robot = Annotated[
     str | None,
-    typer.Option("--robot", metavar="NS", help="Namespace of the robot to look at."),
+    typer.Option("--robot", metavar="NS", help="Robot to look at: its namespace or number."),
 ]
 Reference = Annotated[
     Path | None,

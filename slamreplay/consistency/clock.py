@@ -9,6 +9,8 @@ from slamreplay.consistency.context import CheckContext
 
 #: Offsets beyond this are another epoch or simulated time, not a slow network.
 EPOCH_S = 60.0
+#: Log times below this are no dates, ns: a month after the epoch.
+RELATIVE_NS = 30 * 86_400 * 10**9
 #: From here on the offset is worth a word, and its change over the log a warning.
 OFFSET_S, DRIFT_S = 1.0, 0.1
 
@@ -29,7 +31,10 @@ def check(context: CheckContext) -> tuple[Finding, ...]:
     numbers = f"log time minus header stamp is {median:.3f} s and changes by {drift:+.3f} s"
     n = len(offsets)
     if abs(median) > EPOCH_S:
-        text = f"{numbers}: stamps of another epoch (simulated time, or a log that was replayed)"
+        why = "stamps of another epoch (simulated time, or a log that was replayed)"
+        if median < 0.0 and 0 <= clock.knots[0][0] < RELATIVE_NS:
+            why = "log times count from when the recorder was started"
+        text = f"{numbers}: {why}"
         return (Finding("SR-CLK-001", "info", text, start, end, value=median, unit="s", n=n),)
     if abs(drift) > DRIFT_S:
         text = f"{numbers} over the log: the two clocks run at different speeds"

@@ -50,6 +50,27 @@ def ros_from_gtsam(covariance: ArrayLike, R_parent_body: ArrayLike) -> Array:
     return cov[..., back[:, None], back]
 
 
+def ros_from_openvins(rotation: ArrayLike, position: ArrayLike, R_parent_body: ArrayLike) -> Array:
+    """ROS covariances (..., 6, 6) from the two blocks of a trajectory file of OpenVINS.
+
+    Its rotation error is local, about the body's own axes, and its position error is the parent's:
+    ov_eval holds -Log(R_body_parent R_body_parent_hat') against the rotation block, and turns that
+    block by R_parent_body to see it from the parent (ResultTrajectory::calculate_nees and
+    calculate_error). What position and rotation have in common is not in the file: zero.
+
+    Args:
+        rotation: (..., 3, 3) rad^2 about the body's axes.
+        position: (..., 3, 3) m^2 along the parent's axes.
+        R_parent_body: (..., 3, 3) rotation of the pose.
+    """
+    R = np.asarray(R_parent_body, dtype=np.float64)
+    position = np.asarray(position, dtype=np.float64)
+    out = np.zeros((*position.shape[:-2], 6, 6))
+    out[..., :3, :3] = position
+    out[..., 3:, 3:] = R @ np.asarray(rotation, dtype=np.float64) @ np.swapaxes(R, -1, -2)
+    return out
+
+
 def planar_from_gtsam(covariance: ArrayLike, yaw: ArrayLike) -> Array:
     """Parent-axes x y yaw covariances (..., 3, 3) from gtsam Pose2 (body axes) and headings."""
     return turned(covariance, yaw)

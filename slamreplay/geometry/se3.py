@@ -20,11 +20,11 @@ def unit_quaternion(
     mistakes it for "no rotation".
     """
     q = np.asarray(quaternion_xyzw, dtype=np.float64)
-    norm = np.linalg.norm(q, axis=-1)
-    with np.errstate(invalid="ignore", divide="ignore"):
+    with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
+        norm = np.linalg.norm(q, axis=-1)
         unit = q / norm[..., None]
         sound = np.abs(norm - 1.0) <= tolerance
-    unit[~(norm > 1e-9)] = np.nan
+    unit[~((norm > 1e-9) & (norm < np.inf))] = np.nan
     return unit, sound
 
 

@@ -28,7 +28,7 @@ class Sensed:
     Attributes:
         key: (M,) the keyframe.
         name: (M,) index into `names`.
-        xyyaw: (M, 3) the thing seen from the keyframe.
+        xyyaw: (M, 3) the thing seen from the keyframe; its heading is NaN where it is not sensed.
         cov: (M, 3, 3) in axes of the keyframe.
         names: the things' names, their kind first.
         surveyed: (L, 3) poses in the working frame of the things that are surveyed, else NaN.
@@ -66,7 +66,7 @@ class Sensed:
         known: list[bool] = []
         for j in range(len(self.names)):
             rows = np.flatnonzero(self.name == j)
-            is_known = bool(np.isfinite(self.surveyed[j]).all())
+            is_known = bool(np.isfinite(self.surveyed[j, :2]).all())
             parts = [rows] if is_known else _apart(placed[rows], rows)
             for part in parts:
                 # Seen from one place only, a thing that nobody surveyed says nothing.

@@ -53,7 +53,7 @@ def witnessed_places(
     if sensed is None or not len(sensed.key):
         return plain
     views = _views(sensed, chain, found)
-    known = {j: p for j, p in enumerate(sensed.surveyed) if np.isfinite(p).all()}
+    known = {j: p for j, p in enumerate(sensed.surveyed) if np.isfinite(p[:2]).all()}
     things = sorted(
         j for j in range(len(sensed.names)) if j not in known and sum(j in v for v in views) > 1
     )
@@ -111,7 +111,8 @@ def _cost(
 
 def _miss(seen: se2.Array, at: se2.Array) -> se2.Array:
     step = seen - at
-    step[..., 2] = se2.wrap_angle(step[..., 2])
+    # What was seen as a point has no heading to miss.
+    step[..., 2] = np.nan_to_num(se2.wrap_angle(step[..., 2]), nan=0.0)
     return np.asarray(np.minimum(0.5 * ((step / SIGMA) ** 2).sum(axis=-1), MOST))
 
 

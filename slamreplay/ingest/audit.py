@@ -54,8 +54,12 @@ def inspect(bundle: Bundle) -> dict[str, Any]:
 
 
 def _role_rate(bundle: Bundle, role: str, topic: str) -> float | None:
-    table = bundle.table("transforms" if topic.endswith("tf") else ROLE_TABLES[role])
-    return _rate(table["t_log_ns"][table["topic"] == topic])
+    """Of the topic in its role's table; where tf plays it, in that of tf, whatever it is called."""
+    for table in (bundle.table(ROLE_TABLES[role]), bundle.table("transforms")):
+        mine = table["topic"] == topic
+        if mine.any():
+            return _rate(table["t_log_ns"][mine])
+    return None
 
 
 def _rate(t_log_ns: NDArray[np.int64]) -> float | None:

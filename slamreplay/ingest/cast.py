@@ -2,22 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
-from slamreplay.bundle.manifest import Frames, Loss
+from slamreplay.bundle.manifest import FrameEdge, Frames, Loss
 from slamreplay.bundle.view import ROLE_TABLES
 from slamreplay.errors import UsageError
 from slamreplay.ingest import roles
 from slamreplay.ingest.changes import settle_changes
+from slamreplay.ingest.dead_reckoning import dead_reckoned, is_carried, objection
+from slamreplay.ingest.doubles import without_doubles
 from slamreplay.ingest.frames import direct_pose, find_frames, settle, without_frame
 from slamreplay.ingest.lasers import second_scan
 from slamreplay.ingest.leaks import repeated_reference
 from slamreplay.ingest.log_lines import told_in_logs
-from slamreplay.ingest.names import is_map_frame, is_reference, tokens
+from slamreplay.ingest.names import SCORES, is_map_frame, is_reference, tokens
 from slamreplay.ingest.roles import Choice
 from slamreplay.ingest.rows import TopicRows
 from slamreplay.ingest.sightings import tag_sightings
+from slamreplay.ingest.tables import moved
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,8 +66,17 @@ def settle_cast(topics: Sequence[TopicRows], overrides: Mapping[str, str]) -> Ca
         "particles": roles.choose_particles(free("particles")),
     }
     found |= given
-    odometry = found["odometry"]
     map_frames = _map_frames(others, found)
+    named = overrides
+    if found["odometry"] is None:
+        here = find_frames(tree, None, map_frames, overrides, lambda *_: False)
+        made, lost = _dead_reckoned(free("velocity"), found, tree, here)
+        losses += lost
+        if made is not None:
+            others.append(made.rows)
+            found["odometry"] = made
+            named = {"odom_frame": made.rows.frame(), **overrides}
+    odometry = found["odometry"]
     references = [t for t in others if is_reference(t.topic) and t.table in ("poses", "odometry")]
     disguised: dict[str, str] = {}
 
@@ -75,20 +87,19 @@ def settle_cast(topics: Sequence[TopicRows], overrides: Mapping[str, str]) -> Ca
         return topic is not None
 
     odometry_rows = odometry.rows if odometry else None
-    frames = find_frames(tree, odometry_rows, map_frames, overrides, is_disguise)
+    frames = find_frames(tree, odometry_rows, map_frames, named, is_disguise)
     for frame, topic in disguised.items():
         if frame != frames.map:
             frames, tf_rows, loss = without_frame(frame, topic, frames, tf_rows)
             losses.append(loss)
-    initial = [t for t in free("initial_pose") if roles.is_initial_pose(t)]
-    called = [t for t in free("initial_pose") if t.table == "initial_poses"]
     found |= {
         "pose": roles.choose_pose([*free("pose"), *tf_rows], frames),
-        "initial_pose": roles.choose_simple(initial, "poses", "named as one", ("initialpose",))
-        or roles.choose_simple(called, "initial_poses", "given by a service", ()),
+        "initial_pose": roles.choose_initial_pose(free("initial_pose")),
         "points": roles.choose_simple(free("points"), "points", "point cloud", ("points",)),
-        "plan": roles.choose_simple(free("plan"), "plans", "nav_msgs/Path", ("plan", "path")),
+        "plan": roles.choose_simple(free("plan"), "plans", None, ("plan", "path")),
         "command": roles.choose_command(free("command")),
+        "velocity": roles.choose_velocity(free("velocity")),
+        **_others(free),
         "recovery": roles.choose_recovery(free("recovery")),
     }
     if (first := found["scan"]) is not None:
@@ -101,7 +112,48 @@ def settle_cast(topics: Sequence[TopicRows], overrides: Mapping[str, str]) -> Ca
     if "covariance" not in found and pose is not None and roles.has_covariance(pose.rows):
         found["covariance"] = Choice(pose.rows, "the pose's own")
     choices = {role: choice for role, choice in found.items() if choice is not None}
-    return Cast([*others, *tag_sightings(tf_rows), *tf_rows], choices, frames, losses)
+    seen, others, doubles = without_doubles(tag_sightings(tf_rows), others)
+    return Cast([*others, *seen, *tf_rows], choices, frames, [*losses, *doubles])
+
+
+def _dead_reckoned(
+    topics: Sequence[TopicRows],
+    found: Mapping[str, Choice | None],
+    tree: Sequence[FrameEdge],
+    frames: Frames,
+) -> tuple[Choice | None, list[Loss]]:
+    """Odometry made of measured velocities where tf has none either."""
+    if is_carried(tree, frames):
+        return None, []
+    given = found.get("velocity")
+    velocities = [
+        t for t in topics if t.table == "velocities" and len(t) and not roles.is_command(t)
+    ]
+    if given is not None:
+        velocities = [moved(given.rows, "velocities")]
+    against = {id(t): objection(t) for t in velocities}
+    velocity = roles.best_velocity([t for t in velocities if against[id(t)] is None])
+    if velocity is None:
+        return None, [
+            Loss(kind="skipped", what=t.topic, count=len(t), reason=f"not dead-reckoned: {why}")
+            for t in velocities if (why := against[id(t)])
+        ]  # fmt: skip
+    rows = velocity.rows
+    made, losses = dead_reckoned(rows, tree, frames.base)
+    reason = f"dead-reckoned from the velocities of {roles.type_name(rows.type)}"
+    return Choice(made, reason), losses
+
+
+def _others(free: Callable[[str], list[TopicRows]]) -> dict[str, Choice | None]:
+    """Roles of one message type each, that no other role hangs on."""
+    simple = {
+        "joints": ("joints", "sensor_msgs/JointState", ("joint_states",)),
+        "magnetic_field": ("magnetic_fields", "sensor_msgs/MagneticField", ("mag",)),
+        "closure": ("closures", "closures of a SLAM system", ("info", "constraint_list")),
+        "clock": ("clock", "rosgraph_msgs/Clock", ("clock",)),
+        "quality": ("signals", "a localizer's word on itself", SCORES),
+    }
+    return {role: roles.choose_simple(free(role), *how) for role, how in simple.items()}
 
 
 def _not_given(topics: Sequence[TopicRows], overrides: Mapping[str, str]):  # type: ignore[no-untyped-def]
@@ -122,6 +174,8 @@ def _given(role: str, name: str, topics: Sequence[TopicRows]) -> Choice:
         "initial_poses": ("poses", "initial_poses"),
         "poses": ("poses", "odometry", "transforms"),
         "map_updates": ("costmaps",),
+        "commands": ("commands", "velocities"),
+        "velocities": ("velocities", "commands"),
     }.get(table, (table,))
     named = [t for t in topics if t.topic == name]
     rows = next((t for t in named if t.table in fitting), None)

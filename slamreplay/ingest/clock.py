@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slamreplay.bundle.manifest import Clock, Loss
-from slamreplay.geometry.times import NO_STAMP, NS_PER_S, Times
+from slamreplay.geometry.times import NO_STAMP, NS_PER_S, Times, in_order
 from slamreplay.ingest.names import is_reference
 from slamreplay.ingest.rows import TopicRows
 
@@ -79,7 +79,9 @@ def row_times(topic: TopicRows, clock: Clock) -> tuple[Times, list[Loss]]:
         reason = "header stamp is zero, placed by log time"
         losses.append(_repaired(topic, int((~stamped).sum()), reason))
     # Only rows that agree with the clock prove a topic's stamps; one that jumps proves nothing.
-    if topic.table in (*SENSOR_TABLES, "poses") and not foreign.all() and _jumps(topic, ~foreign):
+    back_ns = 0 if topic.type.startswith(_IN_ORDER) else JUMP_NS
+    judged = topic.table in (*SENSOR_TABLES, "poses") and not foreign.all()
+    if judged and _jumps(topic, ~foreign, back_ns):
         reason = "header stamps jump, placed by log time"
         losses.append(_repaired(topic, int(stamped.sum()), reason))
         return from_log, losses
@@ -87,26 +89,34 @@ def row_times(topic: TopicRows, clock: Clock) -> tuple[Times, list[Loss]]:
         seconds = float(np.median(away[foreign])) / NS_PER_S
         reason = f"stamped by another clock ({seconds:+.0f} s), placed by log time"
         losses.append(_repaired(topic, int(foreign.sum()), reason))
-    return np.where(stamped & ~foreign, topic.t_sensor_ns, from_log), losses
+    t_ns = np.where(stamped & ~foreign, topic.t_sensor_ns, from_log)
+    if topic.type.startswith(_IN_ORDER):
+        t_ns, moved = in_order(t_ns)
+        if moved.any():
+            reason = "header stamps step back, placed between their neighbours"
+            losses.append(_repaired(topic, int(moved.sum()), reason))
+    return t_ns, losses
 
 
 #: What has no header: a log time is all it ever had.
-_UNSTAMPED = frozenset(
-    {
-        "geometry_msgs/msg/Twist",
-        "map_server",
-        "action_msgs/msg/GoalStatusArray",
-        "nav2_msgs/msg/CollisionMonitorState",
-        "nav2_msgs/msg/CollisionDetectorState",
-        "nav2_msgs/action/Spin_FeedbackMessage",
-        "nav2_msgs/action/BackUp_FeedbackMessage",
-        "nav2_msgs/action/Wait_FeedbackMessage",
-        "nav2_msgs/action/DriveOnHeading_FeedbackMessage",
-        "nav2_msgs/action/AssistedTeleop_FeedbackMessage",
-        "nav2_msgs/action/DockRobot_FeedbackMessage",
-        "opennav_docking_msgs/action/DockRobot_FeedbackMessage",
-    }
-)
+_UNSTAMPED = frozenset({"geometry_msgs/msg/Twist", "ackermann_msgs/msg/AckermannDrive",
+                        "std_msgs/msg/Float32", "std_msgs/msg/Float64", "map_server",
+                        "diagnostic_msgs/msg/DiagnosticStatus", "dynamic_reconfigure/msg/Config",
+                        "lifecycle_msgs/msg/TransitionEvent",
+                        "rosgraph_msgs/msg/Clock",
+                        "action_msgs/msg/GoalStatusArray",
+                        "nav2_msgs/msg/CollisionMonitorState",
+                        "nav2_msgs/msg/CollisionDetectorState",
+                        "nav2_msgs/action/Spin_FeedbackMessage",
+                        "nav2_msgs/action/BackUp_FeedbackMessage",
+                        "nav2_msgs/action/Wait_FeedbackMessage",
+                        "nav2_msgs/action/DriveOnHeading_FeedbackMessage",
+                        "nav2_msgs/action/AssistedTeleop_FeedbackMessage",
+                        "nav2_msgs/action/DockRobot_FeedbackMessage",
+                        "opennav_docking_msgs/action/DockRobot_FeedbackMessage"})  # fmt: skip
+#: Types of logs that one process wrote line by line as messages came, each topic from one
+#: publisher: of two rows the later one is the later one, whatever the stamps say.
+_IN_ORDER = ("carmen/", "mrclam/")
 
 
 def _static(topic: TopicRows) -> bool:
@@ -141,8 +151,8 @@ def _problem(topic: TopicRows) -> str | None:
     return "header stamps jump" if _jumps(topic, stamped) else None
 
 
-def _jumps(topic: TopicRows, usable: NDArray[np.bool_]) -> bool:
-    """Whether stamps go back by more than a second in more than one row of a hundred.
+def _jumps(topic: TopicRows, usable: NDArray[np.bool_], back_ns: int = JUMP_NS) -> bool:
+    """Whether stamps go back by more than a second (or `back_ns`) in over one row of a hundred.
 
     Transforms of several publishers are interleaved and latched rows repeat, so a few are normal.
     """
@@ -151,7 +161,7 @@ def _jumps(topic: TopicRows, usable: NDArray[np.bool_]) -> bool:
         return False
     t_log, t = topic.t_log_ns[usable], topic.t_sensor_ns[usable]
     t = t[_near_line(t_log, t - t_log)]  # one wild stamp ahead makes all later ones look late
-    back = np.maximum.accumulate(t) - t > JUMP_NS
+    back = np.maximum.accumulate(t) - t > back_ns
     return bool(back.mean() > 0.01)
 
 
@@ -169,14 +179,18 @@ def _near_line(t_log: Times, offset: NDArray[np.int64]) -> NDArray[np.bool_]:
 
 
 def _knots(topic: TopicRows) -> list[tuple[int, int]]:
-    """(log time, clock time) about every second: medians over the second, robust to delays."""
+    """(log time, clock time) about every second: medians over the second, robust to delays.
+
+    Where stamps step back a second may hold more wrong stamps than right ones, a minute does not.
+    """
+    every_ns = 60 * NS_PER_S if topic.type.startswith(_IN_ORDER) else NS_PER_S
     stamped = topic.t_sensor_ns != NO_STAMP
     t_log = topic.t_log_ns[stamped]
     offset = topic.t_sensor_ns[stamped] - t_log
     near = _near_line(t_log, offset)
     t_log, offset = t_log[near], offset[near]
-    second = (t_log - t_log[0]) // NS_PER_S
-    starts = np.flatnonzero(np.append(True, second[1:] != second[:-1]))
+    part = (t_log - t_log[0]) // every_ns
+    starts = np.flatnonzero(np.append(True, part[1:] != part[:-1]))
     knots = []
     for start, end in zip(starts, np.append(starts[1:], len(t_log)), strict=True):
         middle = int(t_log[start] + (t_log[end - 1] - t_log[start]) // 2)

@@ -13,8 +13,8 @@ from slamreplay.bundle.view import ROLE_TABLES
 from slamreplay.geometry.times import NO_STAMP
 from slamreplay.ingest.cast import Cast
 from slamreplay.ingest.grids import given_map, map_rows, recorded_maps
-from slamreplay.ingest.names import is_reference, is_sensed_dock
-from slamreplay.ingest.roles import Choice, is_costmap, is_estimate, is_initial_pose
+from slamreplay.ingest.names import is_reference, is_sensed_dock, why_no_dock
+from slamreplay.ingest.roles import Choice, is_command, is_costmap, is_estimate, is_initial_pose
 from slamreplay.ingest.rows import TopicRows
 from slamreplay.ingest.tables import moved
 from slamreplay.maps.grid import OccupancyGrid
@@ -83,7 +83,7 @@ def _no_use(
     is_belief = is_estimate(topic, cast.frames) or is_initial_pose(topic)
     is_known = is_belief or is_reference(topic.topic) or is_sensed_dock(topic.topic)
     if topic.table == "poses" and not is_known:
-        return "a pose, but not the robot's in a map"
+        return why_no_dock(topic.topic) or "a pose, but not the robot's in a map"
     return None
 
 
@@ -91,6 +91,8 @@ def _in_its_table(topic: TopicRows, cast: Cast, table_of: Mapping[str, str]) -> 
     table = table_of.get(topic.topic, topic.table)
     # Tags on tf, and recoveries told of in log lines, share their topic's name with it.
     if topic.table in ("transforms", "references", "health", "recoveries"):
+        return topic
+    if {topic.table, table} == {"odometry", "velocities"}:  # so does odometry made of velocities
         return topic
     if topic.topic not in table_of and topic.table == "poses" and is_sensed_dock(topic.topic):
         dock = moved(topic, "references", kind="dock")
@@ -103,6 +105,8 @@ def _in_its_table(topic: TopicRows, cast: Cast, table_of: Mapping[str, str]) -> 
             table = "initial_poses"
         elif is_estimate(topic, cast.frames):
             table = "poses"
+    if topic.topic not in table_of and is_command(topic):
+        table = "commands"
     kind = "simulation" if topic.topic == SIMULATED_TRUTH else "motion_capture"
     return moved(topic, table, kind=kind)
 

@@ -10,7 +10,7 @@ from slamreplay.bundle.schema import PARTS
 #: Part to (what would have been it, what is out of reach without it).
 _WITHOUT = {
     "odometry": (
-        "no nav_msgs/Odometry outside a map frame, no odom -> base on tf",
+        "no nav_msgs/Odometry outside a map frame, no odom -> base on tf, no measured twist",
         "wheel slip and the belief between two poses cannot be judged",
     ),
     "imu": (

@@ -18,16 +18,20 @@ from slamreplay.ingest.inferred import with_inferred
 from slamreplay.ingest.lasers import no_returns
 from slamreplay.ingest.layers import lay_out
 from slamreplay.ingest.log_lines import is_told_in_log
+from slamreplay.ingest.meaning import without_meaning
 from slamreplay.ingest.options import IngestOptions
 from slamreplay.ingest.overrides import check_topics, read_overrides
 from slamreplay.ingest.parts import missing_parts
 from slamreplay.ingest.readers.open_log import open_log
+from slamreplay.ingest.reading import read_rows
 from slamreplay.ingest.reference_file import read_reference
-from slamreplay.ingest.robots import refuse_mixture, topic_filter
+from slamreplay.ingest.repeats import REPEATS, without_repeats
+from slamreplay.ingest.robots import in_its_frames, refuse_mixture, topic_filter
 from slamreplay.ingest.roles import Choice
-from slamreplay.ingest.rows import TopicRows, read_rows
+from slamreplay.ingest.rows import TopicRows
 from slamreplay.ingest.span import clock_between, cut, evidence_span
-from slamreplay.ingest.tables import build, without_prefix
+from slamreplay.ingest.tables import build
+from slamreplay.ingest.text_logs import read_text_log
 
 
 def ingest(
@@ -40,7 +44,8 @@ def ingest(
     """Read a log (one container or several files of one log) into the bundle at `target`.
 
     Args:
-        logs: .bag, .mcap, .db3 files or folders of rosbag2; several are one log.
+        logs: .bag, .mcap, .db3 files or folders of rosbag2, several being one log; or one CARMEN
+            file or MRCLAM folder.
         target: the bundle's folder; the same content there already is kept as it is.
         options: what the user says about the log.
         progress: told a few words and the share done, 0 to 1.
@@ -66,20 +71,11 @@ def _ingest(
     scratch: Path,
 ) -> Bundle:
     overrides = read_overrides(options.topics)
-    with open_log(logs) as (readers, losses):
-        sources = [s for reader in readers for s in reader.sources]
-        connections = [c for reader in readers for c in reader.connections]
-        names = [c.topic for c in connections]
-        if options.robot is None and not overrides:
-            refuse_mixture(connections)
-        skip = topic_filter(names, options.robot)
-        topics, lost = read_rows(readers, skip, progress, scratch)
-    if options.robot is not None:
-        topics = [without_prefix(t, options.robot.strip("/")) for t in topics]
+    sources, topics, losses = _read(logs, options, overrides, progress, scratch)
     check_topics(overrides, sorted({t.topic for t in topics}), options.topics)
     cast = settle_cast(topics, overrides)
     layers = lay_out(cast, options.map)
-    losses = [*losses, *lost, *cast.losses, *layers.losses, *no_returns(cast.topics)]
+    losses = [*losses, *cast.losses, *layers.losses, *no_returns(cast.topics)]
     sources += layers.sources
 
     clock = choose_clock(cast.topics)
@@ -116,6 +112,39 @@ def _ingest(
     )
     write_bundle(target, manifest, with_inferred(manifest, tables), layers.grids)
     return Bundle.open(target)
+
+
+def _read(
+    logs: Sequence[Path],
+    options: IngestOptions,
+    overrides: Mapping[str, str],
+    progress: Callable[[str, float], None] | None,
+    scratch: Path,
+) -> tuple[list[Source], list[TopicRows], list[Loss]]:
+    """Files, rows and losses of a log of any format; of the robot that is looked at."""
+    text = read_text_log(logs, options.robot)
+    if text is not None:
+        sources, topics, losses = list(text.sources), list(text.topics), list(text.losses)
+    else:
+        with open_log(logs) as (readers, found):
+            sources = [s for reader in readers for s in reader.sources]
+            connections = [c for reader in readers for c in reader.connections]
+            if options.robot is None and not overrides:
+                refuse_mixture(connections)
+            of_robot = topic_filter(connections, options.robot)
+            of_use = without_meaning(connections, overrides.values())
+            topics, lost = read_rows(
+                readers, lambda topic: of_robot(topic) or of_use(topic), progress, scratch
+            )
+            losses = [*found, *lost]
+    if options.robot is not None:
+        topics, others = in_its_frames(topics, options.robot)
+        losses += others
+    for place, topic in enumerate(topics):  # again, for a topic is decoded in parts
+        topics[place], count = without_repeats(topic)
+        if count:
+            losses.append(Loss(kind="skipped", what=topic.topic, count=count, reason=REPEATS))
+    return sources, topics, losses
 
 
 def _survey(path: Path, frames: Frames) -> tuple[TopicRows, Source, list[Loss]]:

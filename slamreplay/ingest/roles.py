@@ -10,9 +10,11 @@ import numpy as np
 from slamreplay.bundle.manifest import Frames
 from slamreplay.bundle.no_return import told_as_range_max
 from slamreplay.bundle.recoveries import NAVIGATIONS, tells_of_every_recovery
+from slamreplay.bundle.schema import JUDGING_KINDS
 from slamreplay.ingest.action_names import action_of, is_recovery, service_of
 from slamreplay.ingest.names import (
     basename,
+    is_commanded,
     is_gnss,
     is_map_frame,
     is_odom_frame,
@@ -43,6 +45,8 @@ Rank = Callable[[TopicRows], tuple[object, ...]]
 def is_initial_pose(topic: TopicRows) -> bool:
     """A pose that was given to the localizer."""
     words = "".join(tokens(basename(topic.topic)))
+    if topic.table == "initial_poses":
+        return True
     return topic.table == "poses" and words.startswith(("initialpose", "setpose"))
 
 
@@ -56,6 +60,7 @@ def is_costmap(topic: TopicRows) -> bool:
 def choose_reference(topics: Sequence[TopicRows]) -> Choice | None:
     """An independent idea of the truth, which only judges."""
     found = [t for t in topics if t.table in ("poses", "odometry") and is_reference(t.topic)]
+    found += [t for t in topics if t.table == "references" and _judges(t)]
     return _pick(found, lambda t: (t.messages,), "named as a reference", "most messages")
 
 
@@ -74,7 +79,7 @@ def choose_odometry(topics: Sequence[TopicRows], tf: Sequence[TopicRows]) -> Cho
         on_tf = (t.frame(), t.frame("child_frame_id")) in edges
         return (on_tf, is_odom_frame(t.frame()), "odom" in tokens(t.topic), t.messages)
 
-    return _pick(found, rank, "nav_msgs/Odometry", "its frames are those of tf, then by name")
+    return _pick(found, rank, None, "its frames are those of tf, then by name")
 
 
 def choose_imu(topics: Sequence[TopicRows]) -> Choice | None:
@@ -84,7 +89,7 @@ def choose_imu(topics: Sequence[TopicRows]) -> Choice | None:
     def rank(t: TopicRows) -> tuple[object, ...]:
         return (bool(np.isfinite(t.columns["angular_velocity_xyz"]).any()), t.messages)
 
-    return _pick(found, rank, "sensor_msgs/Imu", "most turn rates")
+    return _pick(found, rank, None, "most turn rates")
 
 
 def choose_scan(topics: Sequence[TopicRows]) -> Choice | None:
@@ -93,7 +98,7 @@ def choose_scan(topics: Sequence[TopicRows]) -> Choice | None:
     if not found:
         return None
     if len(found) == 1:
-        return Choice(found[0], "sensor_msgs/LaserScan, the only one")
+        return Choice(found[0], f"{type_name(found[0].type)}, the only one")
     beams = {id(t): valid_beams(t) for t in found}
     most = max(beams.values())
     close = [t for t in found if beams[id(t)] >= 0.9 * most]
@@ -148,7 +153,7 @@ def choose_map(topics: Sequence[TopicRows]) -> Choice | None:
              and "map" in "".join(tokens(t.topic))]  # fmt: skip
     found = found or [t for t in topics if t.table == "costmaps" and len(t) and not is_costmap(t)]
     return _pick(found, lambda t: (basename(t.topic) == "map", t.columns["width"].max()),
-                 "nav_msgs/OccupancyGrid", "called map, then the largest")  # fmt: skip
+                 None, "called map, then the largest")  # fmt: skip
 
 
 def choose_costmap(topics: Sequence[TopicRows]) -> Choice | None:
@@ -159,17 +164,20 @@ def choose_costmap(topics: Sequence[TopicRows]) -> Choice | None:
 
 
 def choose_simple(
-    topics: Sequence[TopicRows], table: str, what: str, preferred: Sequence[str]
+    topics: Sequence[TopicRows], table: str, what: str | None, preferred: Sequence[str]
 ) -> Choice | None:
     """The topic with most messages in a table; names that end in a preferred word come first."""
     found = [t for t in topics if t.table == table and len(t)]
+    return _pick(found, _by_name(*preferred), what, "by name, then most messages")
 
+
+def _by_name(*preferred: str) -> Rank:
     def rank(t: TopicRows) -> tuple[object, ...]:
         name = basename(t.topic)
         place = [-i for i, word in enumerate(preferred) if name == word]
         return (place[0] if place else -len(preferred), t.messages)
 
-    return _pick(found, rank, what, "by name, then most messages")
+    return rank
 
 
 def choose_recovery(topics: Sequence[TopicRows]) -> Choice | None:
@@ -195,20 +203,53 @@ def _tells_of_recoveries(topic: TopicRows) -> bool:
     return "/MoveBaseAction" not in topic.type and "/DockRobot_" not in topic.type
 
 
+def choose_initial_pose(topics: Sequence[TopicRows]) -> Choice | None:
+    """Where poses were given to the localizer: a topic before calls of its service."""
+    found = [t for t in topics if len(t) and is_initial_pose(t)]
+    return _pick(found, _by_name("initialpose"), "named as one", "by name, then most messages")
+
+
+def is_command(topic: TopicRows) -> bool:
+    """What the base was told; a stamped twist without such a name is a measurement."""
+    if topic.table == "velocities":
+        return topic.type.endswith("/TwistStamped") and is_commanded(topic.topic)
+    return topic.table == "commands"
+
+
 def choose_command(topics: Sequence[TopicRows]) -> Choice | None:
-    """What the base was told; a stamped twist without such a name may be a measurement."""
-    named = {"cmd", "command"}
-    found = [
-        t for t in topics if t.table == "commands" and len(t)
-        and (t.type.endswith("/Twist") or named & set(tokens(t.topic)))
-    ]  # fmt: skip
-    return choose_simple(found, "commands", "velocity command", ("cmd_vel", "command"))
+    """What the base was told."""
+    found = [t for t in topics if len(t) and is_command(t)]
+    return _pick(found, _by_name("cmd_vel", "command"), "velocity command",
+                 "by name, then most messages")  # fmt: skip
 
 
-def _pick(found: Sequence[TopicRows], rank: Rank, what: str, order: str) -> Choice | None:
+def choose_velocity(topics: Sequence[TopicRows]) -> Choice | None:
+    """The measured velocity that tells most often; one with a covariance first."""
+    return best_velocity(
+        [t for t in topics if t.table == "velocities" and len(t) and not is_command(t)]
+    )
+
+
+def best_velocity(found: Sequence[TopicRows]) -> Choice | None:
+    """Of topics that are known to be measured velocities."""
+
+    def rank(t: TopicRows) -> tuple[object, ...]:
+        return (bool(np.isfinite(t.columns["twist_covariance"]).all(axis=1).any()), t.messages)
+
+    return _pick(found, rank, "measured velocity", "with covariance, then most messages")
+
+
+def type_name(kind: str) -> str:
+    """A message type as people write it: "sensor_msgs/LaserScan"."""
+    return kind.replace("/msg/", "/")
+
+
+def _pick(found: Sequence[TopicRows], rank: Rank, what: str | None, order: str) -> Choice | None:
+    """The topic that ranks highest; `what` it is, or None for its type."""
     if not found:
         return None
     chosen = max(found, key=lambda t: (rank(t), t.topic))
+    what = what or type_name(chosen.type)
     if len(found) == 1:
         return Choice(chosen, f"{what}, the only one")
     return Choice(chosen, f"{what}, chosen of {len(found)}: {order}")
@@ -227,6 +268,10 @@ def is_estimate(topic: TopicRows, frames: Frames) -> bool:
     if topic.table != "poses" or is_odom_frame(topic.frame()):
         return False
     return in_map and (bool(words & _BELIEF) or topic.type.endswith("WithCovarianceStamped"))
+
+
+def _judges(topic: TopicRows) -> bool:
+    return bool(len(topic)) and set(topic.columns["kind"]) <= JUDGING_KINDS
 
 
 def _correction(topics: Sequence[TopicRows], frames: Frames) -> TopicRows | None:

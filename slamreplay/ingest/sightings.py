@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -11,11 +12,15 @@ from slamreplay.ingest.names import basename, is_map_frame, is_odom_frame, token
 from slamreplay.ingest.rows import TopicRows
 
 _TAG = frozenset({"tag", "apriltag", "aruco", "marker", "fiducial", "fid"})
+#: apriltag_ros of ROS 2 names tags by their family alone where the user names them not: "36h11:0".
+_FAMILY = re.compile(r"[a-z]*\d+h\d+:\d+")
 
 
 def is_tag_frame(frame: str) -> bool:
-    """Whether a frame is called like a numbered tag: "tag_3", "tag36h11:3", "fiducial_12"."""
+    """Whether a frame is called like a numbered tag: "tag_3", "36h11:3", "fiducial_12"."""
     words = tokens(basename(frame))
+    if _FAMILY.fullmatch(basename(frame)):
+        return True
     return len(words) > 1 and words[0] in _TAG and words[-1].isdigit()
 
 

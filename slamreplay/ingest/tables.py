@@ -14,6 +14,7 @@ from slamreplay.geometry.times import Times
 from slamreplay.ingest.assembly import Assembly
 from slamreplay.ingest.rows import TopicRows
 
+_MOVING = ("linear_velocity_xyz", "angular_velocity_xyz")
 _POSED = ("frame_id", "child_frame_id", "position_xyz", "orientation_xyzw")
 
 
@@ -22,7 +23,8 @@ def moved(topic: TopicRows, table: str, *, kind: str = "") -> TopicRows:
 
     Args:
         topic: rows as they were decoded.
-        table: "poses", "references", "initial_poses", or the table it is in.
+        table: "poses", "references", "initial_poses", "commands", "velocities", or the table it
+            is in.
         kind: of a reference.
 
     Raises:
@@ -31,6 +33,12 @@ def moved(topic: TopicRows, table: str, *, kind: str = "") -> TopicRows:
     if topic.table == table:
         return topic
     columns: dict[str, Any] = {}
+    if {topic.table, table} == {"commands", "velocities"}:
+        columns = {name: topic.columns[name] for name in _MOVING}
+        if table == "velocities":  # an unstamped twist names no frame: it is the robot's base
+            columns["frame_id"] = np.full(len(topic), "", dtype=object)
+            columns["twist_covariance"] = np.full((len(topic), 36), np.nan)
+        return replace(topic, table=table, columns=columns)
     if topic.table in ("poses", "odometry") and table in ("poses", "references", "initial_poses"):
         covariance = "pose_covariance" if topic.table == "odometry" else "covariance"
         columns = {name: topic.columns[name] for name in _POSED}

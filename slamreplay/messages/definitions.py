@@ -12,7 +12,12 @@ UbiquityRobotics/fiducials, magazino/move_base_flex.
 
 from __future__ import annotations
 
+from slamreplay.messages.drives import DRIVES
+from slamreplay.messages.foxglove import FOXGLOVE_DEFINITIONS
 from slamreplay.messages.recoveries import LATER_RECOVERIES, RECOVERIES
+from slamreplay.messages.signals import SIGNALS
+from slamreplay.messages.slam import SLAM
+from slamreplay.messages.tags import TAGS
 
 #: Type name ("package/msg/Name") to its fields, one per line.
 DEFINITIONS: dict[str, str] = {
@@ -112,7 +117,12 @@ DEFINITIONS: dict[str, str] = {
     # tf of ROS 1: the store of Noetic has neither name.
     "tf/msg/tfMessage": "geometry_msgs/TransformStamped[] transforms\n",
     "tf2_msgs/msg/TFMessage": "geometry_msgs/TransformStamped[] transforms\n",
+    **DRIVES,
+    **FOXGLOVE_DEFINITIONS,
     **RECOVERIES,
+    **SIGNALS,
+    **SLAM,
+    **TAGS,
 }
 
 #: Newer layouts of the same names; a log that has them says so in its own definitions.

@@ -21,7 +21,7 @@ from slamreplay.errors import SlamreplayError
 from slamreplay.geometry.times import NO_STAMP
 from slamreplay.ingest.decoders.decoder import Decoded, Decoder, Messages
 from slamreplay.ingest.readers.reader import Block, Connection
-from slamreplay.ingest.rows import read_rows
+from slamreplay.ingest.reading import read_rows
 from slamreplay.testing.conformance import ConformanceError, demand
 
 _ADDED = ("t_ns", "t_sensor_ns", "t_log_ns", "topic")

@@ -13,8 +13,6 @@ import time
 from pathlib import Path
 from tempfile import mkdtemp
 
-import pytest
-
 sys.path.insert(0, str(Path(__file__).parent))
 from test_reading import log_of
 

@@ -21,7 +21,7 @@ from slamreplay.bundle.manifest import Source
 from slamreplay.ingest.readers.mcap_file import McapReader
 from slamreplay.ingest.readers.ros1 import Ros1Reader
 from slamreplay.ingest.readers.sqlite_file import SqliteReader
-from slamreplay.ingest.rows import read_rows
+from slamreplay.ingest.reading import read_rows
 
 READERS = {".mcap": McapReader, ".bag": Ros1Reader, ".db3": SqliteReader}
 

@@ -134,12 +134,16 @@ class Decoded:
         rows: (M,) index of the message each row came from.
         t_sensor_ns: (M,) header stamps, NO_STAMP where there is none.
         remarks: what was repaired, lost or skipped; those with count 0 are ignored.
+        table: another table than the decoder's, where the topic's name asks for it.
+        also: rows of further tables that the same messages hold.
     """
 
     columns: Mapping[str, Any]
     rows: NDArray[np.int64]
     t_sensor_ns: Times
     remarks: tuple[Remark, ...] = field(default=())
+    table: str = ""
+    also: tuple[Decoded, ...] = field(default=())
 
 
 @dataclass(frozen=True)

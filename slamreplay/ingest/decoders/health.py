@@ -1,4 +1,4 @@
-"""diagnostic_msgs/DiagnosticArray, and the log lines of ROS 1 and ROS 2."""
+"""diagnostic_msgs/DiagnosticArray and DiagnosticStatus, and the log lines of ROS 1 and ROS 2."""
 
 from __future__ import annotations
 
@@ -6,18 +6,28 @@ from typing import Any
 
 import numpy as np
 
-from slamreplay.geometry.times import Times
+from slamreplay.geometry.times import NO_STAMP, Times
 from slamreplay.ingest.decoders.decoder import Decoded, Decoder, Messages
+
+#: Level of rows whose message type has none: info, as rcl_interfaces/Log counts.
+INFO = 20
 
 
 def _diagnostics(messages: Messages) -> Decoded:
     states, rows = messages.children("status")
-    columns = {
+    return Decoded(_status(states), rows, messages.stamps()[rows])
+
+
+def _single(messages: Messages) -> Decoded:
+    return Decoded(_status(messages), messages.every, np.full(len(messages), NO_STAMP))
+
+
+def _status(states: Messages) -> dict[str, Any]:
+    return {
         "level": np.array([_number(v) for v in states.column("level", object)], dtype=np.int32),
         "name": states.texts("name"),
         "message": states.texts("message"),
     }
-    return Decoded(columns, rows, messages.stamps()[rows])
 
 
 def _log(messages: Messages) -> Decoded:
@@ -36,4 +46,5 @@ def _number(level: Any) -> int:
 
 
 DIAGNOSTICS = Decoder("health", _diagnostics)
+DIAGNOSTIC_STATUS = Decoder("health", _single)
 LOG = Decoder("health", _log)

@@ -6,12 +6,13 @@ from typing import Any
 
 import numpy as np
 
+from slamreplay.bundle.tables import Ragged
 from slamreplay.ingest.decoders.checks import kept
 from slamreplay.ingest.decoders.decoder import Decoded, Decoder, Messages, Remark
 
 
-def _decode(messages: Messages) -> Decoded:
-    ranges = messages.ragged("ranges", np.float32)
+def scan_rows(messages: Messages, ranges: Ragged, remarks: tuple[Remark, ...] = ()) -> Decoded:
+    """Rows of table scans: one range a beam, and the fields that every laser scan has."""
     columns: dict[str, Any] = {
         "frame_id": messages.frames(),
         "angle_min_rad": messages.column("angle_min"),
@@ -27,11 +28,15 @@ def _decode(messages: Messages) -> Decoded:
         finite &= np.isfinite(columns[name])
     finite &= ~np.isnan(columns["range_max_m"])
     moving = (columns["angle_increment_rad"] != 0.0) | (ranges.lengths <= 1)
-    remarks = (
+    own = (
         Remark("lost", int((~finite).sum()), "angles or range limits are not finite"),
         Remark("lost", int((finite & ~moving).sum()), "angle increment is zero"),
     )
-    return kept(finite & moving, columns, messages.every, messages.stamps(), remarks)
+    return kept(finite & moving, columns, messages.every, messages.stamps(), (*remarks, *own))
+
+
+def _decode(messages: Messages) -> Decoded:
+    return scan_rows(messages, messages.ragged("ranges", np.float32))
 
 
 LASER_SCAN = Decoder("scans", _decode)

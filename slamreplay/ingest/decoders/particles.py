@@ -2,15 +2,43 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
+from numpy.typing import NDArray
 
 from slamreplay.bundle.tables import Ragged
 from slamreplay.geometry import se3
+from slamreplay.geometry.times import Times
 from slamreplay.ingest.decoders.checks import pose_rows
 from slamreplay.ingest.decoders.decoder import Decoded, Decoder, Messages, Remark
 
 
 def _decode(messages: Messages, children: str, path: str, *, weighted: bool) -> Decoded:
+    return cloud_rows(
+        messages, children, path, messages.frames(), messages.stamps(), weighted=weighted
+    )
+
+
+def cloud_rows(
+    messages: Messages,
+    children: str,
+    path: str,
+    frames: NDArray[Any],
+    t_sensor_ns: Times,
+    *,
+    weighted: bool,
+) -> Decoded:
+    """Rows of table particles, one a message.
+
+    Args:
+        messages: N messages.
+        children: name of their sequence of particles.
+        path: from a particle to its pose's fields, with its last dot.
+        frames: (N,) the frame of each cloud.
+        t_sensor_ns: (N,) stamps.
+        weighted: whether particles have a weight.
+    """
     particles, rows = messages.children(children)
     position = particles.columns(f"{path}position", "xyz")
     unit, keep, remarks = pose_rows(position, particles.columns(f"{path}orientation", "xyzw"))
@@ -21,12 +49,12 @@ def _decode(messages: Messages, children: str, path: str, *, weighted: bool) -> 
     if weighted:
         weights = Ragged(particles.column("weight")[keep], offsets)
     columns = {
-        "frame_id": messages.frames(),
+        "frame_id": frames,
         "xyyaw": Ragged(xyyaw.ravel(), 3 * offsets),
         "weights": weights,
     }
     named = tuple(Remark(r.kind, r.count, f"particles: {r.reason}") for r in remarks)
-    return Decoded(columns, messages.every, messages.stamps(), named)
+    return Decoded(columns, messages.every, t_sensor_ns, named)
 
 
 def _pose_array(messages: Messages) -> Decoded:

@@ -88,7 +88,7 @@ def _files(path: Path, losses: list[Loss]) -> list[tuple[Path, str]]:
         raise LogError(
             "a folder without a storage file",
             where=path,
-            hint="give a .bag, .mcap or .db3, or a folder of rosbag2",
+            hint="give a .bag, .mcap or .db3, or a folder of rosbag2 or MRCLAM",
         )
     return [(file, compression) for file in files]
 
@@ -115,7 +115,7 @@ def _open(path: Path, digest: str, compression: str, stack: ExitStack) -> Reader
             opened = reader(file, source)
             return _Decompressing(opened) if compression == "zstd" else opened
     what = "the file is empty" if not head else "not a log that is known here"
-    raise LogError(what, where=path, hint="a ROS 1 .bag, .mcap or rosbag2 .db3 is expected")
+    raise LogError(what, where=path, hint="a .bag, .mcap, .db3 or CARMEN .clf is expected")
 
 
 class _Decompressing:

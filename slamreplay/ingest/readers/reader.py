@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from slamreplay.bundle.manifest import Loss, Source
 from slamreplay.geometry.times import Times
+from slamreplay.messages.foxglove import SCHEMA_PREFIX, TYPE_PREFIX
 
 #: Bytes of a container that are held and decoded at a time.
 WINDOW_BYTES = 32_000_000
@@ -23,12 +24,14 @@ class Connection:
     Attributes:
         index: number within its reader.
         topic: name of the topic.
-        type: normalised type name, `package/msg/Type`, for ROS 1 too.
-        encoding: how messages are serialised: "ros1", "cdr", or what else the container says.
+        type: normalised type name, `package/msg/Type`, for ROS 1 and Foxglove's schemas too.
+        encoding: how messages are serialised: "ros1", "cdr", "json", "protobuf", or what else the
+            container says.
         definition: text of the type's definition; empty where the container has none.
         definition_format: "msg", "idl", or the container's word for another kind of schema.
         count: messages the container says it holds.
-        schema: the definition as it was recorded, for schemas that are no text.
+        schema: the definition as recorded, whatever it is written in (protobuf: a serialised
+            FileDescriptorSet).
     """
 
     index: int
@@ -107,6 +110,9 @@ class Reader(Protocol):
 
 
 def normalise_type(name: str) -> str:
-    """`package/msg/Type` of ROS 1's `package/Type` and ROS 2's own spelling."""
-    package, _, rest = name.strip().partition("/")
-    return f"{package}/msg/{rest}" if rest and "/" not in rest else name.strip()
+    """`package/msg/Type` of ROS 1's `package/Type`, ROS 2's own spelling, and `foxglove.Type`."""
+    name = name.strip()
+    if name.startswith((SCHEMA_PREFIX, "foxglove/")):
+        return TYPE_PREFIX + name[len(SCHEMA_PREFIX) :].removeprefix("msg/")
+    package, _, rest = name.partition("/")
+    return f"{package}/msg/{rest}" if rest and "/" not in rest else name

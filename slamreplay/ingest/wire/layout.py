@@ -8,7 +8,7 @@ from typing import Any
 
 #: Names of primitive types in message definitions to numpy's, without a byte order.
 _NUMBERS = {
-    "bool": "u1",
+    "bool": "b1",
     "byte": "u1",
     "char": "u1",
     "int8": "i1",

@@ -20,6 +20,7 @@ from slamreplay.ingest.wire.places import (
     Place,
     RunPlace,
     TextPlace,
+    as_numbers,
     gather,
     numbers,
 )
@@ -58,10 +59,7 @@ class WireMessages(Messages):
 
     def column(self, path: str, dtype: Any = np.float64) -> NDArray[Any]:
         """See `Messages`."""
-        found = numbers(self._data, self._found(path, NumberPlace))
-        if dtype is object:
-            return np.array(found.tolist(), dtype=object)
-        return np.ascontiguousarray(found, dtype=dtype)
+        return _cast(numbers(self._data, self._found(path, NumberPlace)), dtype)
 
     def columns(self, path: str, names: str) -> NDArray[np.float64]:
         """See `Messages`."""
@@ -90,13 +88,15 @@ class WireMessages(Messages):
         return numbers(self._data, place, size).astype(np.float64)
 
     def ragged(self, path: str, dtype: Any) -> Ragged:
-        """See `Messages`."""
+        """See `Messages`; with the dtype object texts too."""
+        if isinstance(self._at(path), ManyPlace):
+            return self._ragged_texts(path)
         place = self._found(path, RunPlace)
         n = len(self)
         if isinstance(place.counts, int):
             values = numbers(self._data, place, place.counts).ravel()
             offsets = place.counts * np.arange(n + 1, dtype=np.int64)
-            return Ragged(np.ascontiguousarray(values, dtype=dtype), offsets)
+            return Ragged(_cast(values, dtype), offsets)
         counts = place.counts
         size = int(place.dtype[2])
         begin = place.base + place.offset
@@ -104,9 +104,9 @@ class WireMessages(Messages):
         pieces = [
             view[a:b] for a, b in zip(begin.tolist(), (begin + counts * size).tolist(), strict=True)
         ]
-        values = np.frombuffer(b"".join(pieces), dtype=place.dtype)
+        values = as_numbers(np.frombuffer(b"".join(pieces), dtype=np.uint8), place.dtype)
         offsets = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
-        return Ragged(values.astype(dtype), offsets)
+        return Ragged(_cast(values, dtype), offsets)
 
     def texts(self, path: str) -> NDArray[Any]:
         """See `Messages`."""
@@ -141,6 +141,12 @@ class WireMessages(Messages):
             raise FieldError(f"{path or 'an element'} is of another kind")
         return place
 
+    def _ragged_texts(self, path: str) -> Ragged:
+        place = self._found(path, ManyPlace)
+        texts, _ = self.children(path)
+        offsets = np.concatenate([[0], np.cumsum(place.counts)]).astype(np.int64)
+        return Ragged(texts.texts(""), offsets)
+
     def _texts(self, path: str, change: Callable[[str], str]) -> NDArray[Any]:
         """Texts, each distinct one decoded and changed once."""
         place = self._found(path, TextPlace)
@@ -157,6 +163,13 @@ class WireMessages(Messages):
             words[:] = [change(bytes(word).decode("utf-8", "replace")) for word in distinct]
             out[index] = words[codes]
         return out
+
+
+def _cast(values: NDArray[Any], dtype: Any) -> NDArray[Any]:
+    """Numbers as another dtype; Python's own numbers for object."""
+    if dtype is object:
+        return np.array([*values.tolist(), None], dtype=object)[:-1]
+    return np.ascontiguousarray(values, dtype=dtype)
 
 
 def _distinct(raw: Bytes) -> tuple[Bytes, NDArray[np.int64]]:

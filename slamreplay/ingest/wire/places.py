@@ -132,8 +132,13 @@ def numbers(data: Bytes, place: NumberPlace | RunPlace, count: int = 1) -> NDArr
     """(N,) numbers of a place, or (N, count) of runs that have one length, in native order."""
     size = count * int(place.dtype[2])
     raw = gather(data, place.base, place.offset, size)
-    found = raw.view(place.dtype)
+    found = as_numbers(raw, place.dtype)
     return found[:, 0] if isinstance(place, NumberPlace) else found
+
+
+def as_numbers(raw: Bytes, dtype: str) -> NDArray[Any]:
+    """Bytes (..., size) as numbers; of truth values every byte but zero is true."""
+    return raw != 0 if dtype.endswith("b1") else raw.view(dtype)
 
 
 def _at(value: int | Positions, index: Positions) -> int | Positions:

@@ -21,6 +21,8 @@ _CDR = {
     b"\x00\x07": Encoding("<", 4, terminated=True, padding=3),
 }
 _HEADER = 4
+#: Encodings that are read from bytes.
+WIRE_ENCODINGS = frozenset({"ros1", "cdr"})
 
 
 def read_messages(
