@@ -456,6 +456,15 @@ DECODER_LINES = {
         T,
     ),
     "rosgraph_msgs/msg/Clock": ({"clock": STAMP}, {"clock_ns": T}, None),
+    "nav2_msgs/srv/SetInitialPose_Event": (
+        {
+            "info": {"event_type": 1, "stamp": STAMP},
+            "request": [{"pose": {"header": HEADER, "pose": POSED}}],
+            "response": [],
+        },
+        {**PLACED, "covariance": COV36},
+        T,
+    ),
     "action_msgs/msg/GoalStatusArray": (
         {"status_list": [GOAL]},
         {"name": "spin", "status": "aborted", "goal": "07" * 16, "source": "action"},
@@ -512,12 +521,6 @@ DECODER_LINES = {
         {"name": "reinitialize_global_localization", "status": "running", "source": "service"},
         T,
         {"topic": "/reinitialize_global_localization/_service_event", "after": event(2)},
-    ),
-    "nav2_msgs/srv/SetInitialPose_Event": (
-        event(1, [{"pose": {"header": HEADER, "pose": POSED}}]),
-        {"position_xyz": [1, 2, 3], "orientation_xyzw": [0, 0, 0.6, 0.8], "covariance": COV36},
-        T,
-        {"after": event(2)},
     ),
     "move_base_msgs/msg/MoveBaseActionGoal": (
         {"header": HEADER, "goal_id": GOAL_ID, "goal": TARGET},

@@ -10,6 +10,7 @@ from slamreplay.ingest import DECODERS
 from slamreplay.ingest.decoders.decoder import Messages
 from slamreplay.ingest.decoders.grid import COST_SCALE
 from slamreplay.messages.definitions import LATER_DEFINITIONS
+from slamreplay.messages.interfaces import as_message
 
 T_LOG = np.array([10, 20, 30], dtype=np.int64)
 
@@ -53,8 +54,8 @@ def random_message(logs):
 def test_every_decoder_fills_the_columns_of_its_table(logs):
     times = {"t_ns", "t_sensor_ns", "t_log_ns", "topic"}
     for kind in DECODERS:
-        ros = 2 if kind in logs.stores[2].fielddefs else 1
-        decoded = decode(kind, logs.make(kind, ros))
+        ros = 2 if as_message(kind) in logs.stores[2].fielddefs else 1
+        decoded = decode(kind, logs.make(as_message(kind), ros))
         schema = TABLES[DECODERS.load(kind).table]
         assert set(decoded.columns) == {c.name for c in schema.columns} - times, kind
         assert len(decoded.rows) == len(decoded.t_sensor_ns), kind

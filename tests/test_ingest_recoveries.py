@@ -22,7 +22,12 @@ from slamreplay.ingest.reading import read_rows
 from slamreplay.ingest.roles import choose_recovery
 from slamreplay.ingest.rows import TopicRows
 from slamreplay.messages.definitions import DEFINITIONS
-from slamreplay.messages.interfaces import SEPARATOR, base_interface, message_definition
+from slamreplay.messages.interfaces import (
+    SEPARATOR,
+    as_message,
+    base_interface,
+    message_definition,
+)
 from slamreplay.messages.layouts import layouts
 from slamreplay.messages.recoveries import INTERFACES
 
@@ -68,7 +73,7 @@ def recorded(logs, messages):
                 topics[topic] = len(topics) + 1
                 row = (topics[topic], topic, kind)
                 db.execute("INSERT INTO topics VALUES(?, ?, ?, 'cdr', '')", row)
-            data = bytes(logs.stores[2].serialize_cdr(message, kind))
+            data = bytes(logs.stores[2].serialize_cdr(message, as_message(kind)))
             db.execute("INSERT INTO messages(topic_id, timestamp, data) VALUES(?, ?, ?)",
                        (topics[topic], t_ns, data))  # fmt: skip
     return path
@@ -217,7 +222,7 @@ def test_no_goal_has_the_same_status_twice_in_a_row_or_one_after_its_end(arrays)
 
 
 def test_feedback_of_a_behaviour_is_its_start(logs):
-    items = [logs.make(SPIN, goal_id__uuid=uuid(g)) for g in (1, 1, 1, 2, 2)]
+    items = [logs.make(as_message(SPIN), goal_id__uuid=uuid(g)) for g in (1, 1, 1, 2, 2)]
     messages = [("/spin/_action/feedback", SPIN, m, START + k) for k, m in enumerate(items)]
 
     (rows,), losses = rows_of(recorded(logs, messages))
@@ -230,7 +235,7 @@ def test_feedback_of_a_behaviour_is_its_start(logs):
 def test_each_recovery_that_a_navigation_counts_is_a_row(logs):
     counts = [(1, 0), (1, 0), (1, 1), (1, 3), (2, 0), (2, 1), (2, 1), (3, 2)]
     items = [
-        logs.make(TO_POSE, goal_id__uuid=uuid(g), feedback__number_of_recoveries=n)
+        logs.make(as_message(TO_POSE), goal_id__uuid=uuid(g), feedback__number_of_recoveries=n)
         for g, n in counts
     ]
     messages = [("/to/_action/feedback", TO_POSE, m, START + k) for k, m in enumerate(items)]
@@ -263,8 +268,8 @@ def test_navigation_feedback_with_the_text_of_its_action_counts(logs, release):
         )
         channel = writer.register_channel("/navigate/_action/feedback", "cdr", schema)
         for t_ns, count in enumerate((0, 2)):
-            message = logs.make(kind, feedback__number_of_recoveries=count)
-            data = bytes(store.serialize_cdr(message, kind))
+            message = logs.make(as_message(kind), feedback__number_of_recoveries=count)
+            data = bytes(store.serialize_cdr(message, as_message(kind)))
             writer.add_message(channel, log_time=t_ns, publish_time=t_ns, data=data)
         writer.finish()
 
@@ -280,8 +285,8 @@ def test_a_db3_of_humble_is_read_without_any_definition(logs):
     spin = logs.make(change, node_name="Spin", previous_status="IDLE", current_status="RUNNING")
     messages = [
         ("/behavior_tree_log", tree, logs.make(tree, event_log=[spin]), START),
-        ("/spin/_action/feedback", SPIN, logs.make(SPIN), START),
-        ("/navigate_to_pose/_action/feedback", TO_POSE, logs.make(TO_POSE), START),
+        ("/spin/_action/feedback", SPIN, logs.make(as_message(SPIN)), START),
+        ("/navigate_to_pose/_action/feedback", TO_POSE, logs.make(as_message(TO_POSE)), START),
     ]
 
     rows, losses = rows_of(recorded(logs, messages))
@@ -298,7 +303,9 @@ def test_a_db3_of_humble_is_read_without_any_definition(logs):
 
 
 def called(logs, kind, number, event, **values):
-    message = logs.make(kind, info__event_type=event, info__sequence_number=number, **values)
+    message = logs.make(
+        as_message(kind), info__event_type=event, info__sequence_number=number, **values
+    )
     message.info.stamp.sec = 5
     return message
 
@@ -340,7 +347,7 @@ def test_the_newer_service_says_whether_it_cleared(logs):
 
 
 def test_a_goal_that_was_sent_is_pending_until_it_is_refused(logs):
-    ask, answer = (f"nav2_msgs/action/Spin_SendGoal_{part}" for part in ("Request", "Response"))
+    ask, answer = (f"nav2_msgs/msg/Spin_SendGoal_{part}" for part in ("Request", "Response"))
     asked = [[logs.make(ask, goal_id__uuid=uuid(g))] for g in (1, 2)]
     items = [
         called(logs, SEND, 1, 1, request=asked[0]),
@@ -524,7 +531,7 @@ def test_the_parts_in_which_a_log_is_read_change_nothing(logs, size):
     counts, actions = (0, 1, 1, 3, 3, 4), (0, 1, 1, 1, 0, 0)
     messages = []
     for k, (array, count, action) in enumerate(zip(arrays, counts, actions, strict=True)):
-        feedback = logs.make(TO_POSE, feedback__number_of_recoveries=count)
+        feedback = logs.make(as_message(TO_POSE), feedback__number_of_recoveries=count)
         monitor = logs.make(state, action_type=action)
         messages += [
             ("/spin/_action/status", GOAL, statuses(logs, *array), START + k),
@@ -572,7 +579,7 @@ def test_a_navigator_is_believed_before_single_actions_and_log_lines(logs, tmp_p
         ("/rosout", log, said, START),
         ("/spin/_action/status", GOAL, statuses(logs, (1, 2)), START),
         ("/navigate_to_pose/_action/status", GOAL, statuses(logs, (5, 2)), START),
-        ("/navigate_to_pose/_action/feedback", TO_POSE, logs.make(TO_POSE), START),
+        ("/navigate_to_pose/_action/feedback", TO_POSE, logs.make(as_message(TO_POSE)), START),
     ]
     played = {}
     for count in range(1, len(messages) + 1):
@@ -602,16 +609,3 @@ def test_goals_alone_are_no_word_of_recoveries(logs, tmp_path):
     (missing,) = [m for m in bundle.manifest.missing if m.part == "recovery"]
     assert missing.consequence == "recoveries can only be inferred from motion and costmaps"
     assert len(bundle.table("recoveries")) == 1
-
-
-def test_an_initial_pose_set_by_a_service_plays_its_role(logs):
-    kind = "nav2_msgs/srv/SetInitialPose_Event"
-    pose = "nav2_msgs/msg/SetInitialPose_Request"
-    request = logs.make(pose, pose__pose__pose__position__x=3.0,
-                        pose__pose__pose__orientation__w=1.0)  # fmt: skip
-    items = [called(logs, kind, 1, 3), called(logs, kind, 1, 1, request=[request])]
-
-    decoded = decode(kind, called(logs, kind, 0, 3), *items[1:])
-
-    assert decoded.rows.tolist() == [1]
-    assert decoded.columns["position_xyz"].tolist() == [[3.0, 0.0, 0.0]]

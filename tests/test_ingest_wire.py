@@ -11,6 +11,7 @@ from type_store import type_store
 from slamreplay.ingest import DECODERS
 from slamreplay.ingest.wire.layout import Number, Struct, Text, layout_of
 from slamreplay.ingest.wire.read import read_messages
+from slamreplay.messages.interfaces import as_message
 
 #: Layouts that alignment makes awkward: what real types have only here and there, all at once.
 ODD = {
@@ -24,7 +25,7 @@ ODD = {
         "odd/Tail[2] pair\nint8[] bytes\nint64 last\n"
     ),
 }
-NAMES = sorted(n for n in {*DECODERS, "odd/msg/All"} if not n.startswith("foxglove"))
+NAMES = sorted(as_message(n) for n in {*DECODERS, "odd/msg/All"} if not n.startswith("foxglove"))
 
 
 def store(ros, *, later=False):

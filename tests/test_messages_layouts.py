@@ -13,7 +13,7 @@ from slamreplay.ingest.readers.reader import Connection
 from slamreplay.ingest.types import layouts as layouts_of
 from slamreplay.ingest.wire.read import read_messages
 from slamreplay.messages.definitions import DEFINITIONS, LATER_DEFINITIONS
-from slamreplay.messages.interfaces import SEPARATOR, message_definition
+from slamreplay.messages.interfaces import SEPARATOR, as_message, message_definition
 from slamreplay.messages.layouts import layouts
 from slamreplay.messages.recoveries import INTERFACES
 
@@ -58,11 +58,11 @@ def store_of(name, text):
 def payload(logs, store, name, **values):
     """A message with one element in the sequence that differs between layouts."""
     logs.stores[2] = store
-    message = logs.make(name)
+    message = logs.make(as_message(name))
     sequence = AMBIGUOUS[name]
     if sequence is not None:
         getattr(message, sequence[0]).append(logs.make(sequence[1], **values))
-    return bytes(store.serialize_cdr(message, name))
+    return bytes(store.serialize_cdr(message, as_message(name)))
 
 
 @pytest.mark.parametrize("name", AMBIGUOUS)
@@ -76,7 +76,7 @@ def test_the_first_layout_that_reads_all_of_a_message_is_its_own(logs, name):
         readable = []
         for k, other in enumerate(stores):
             try:
-                other.deserialize_cdr(data, name)
+                other.deserialize_cdr(data, as_message(name))
                 readable.append(k)
             except (SerdeError, ValueError, IndexError, UnicodeDecodeError):
                 pass
@@ -116,7 +116,7 @@ def test_every_layout_of_an_action_or_service_is_whole(name):
     for part in parts:
         for text in layouts(f"{name}_{part}"):
             store = store_of(f"{name}_{part}", text)
-            assert store.types[f"{name}_{part}"]
+            assert store.types[as_message(f"{name}_{part}")]
 
 
 @pytest.mark.parametrize("head", ["", f"{SEPARATOR}SRV: nav2_msgs/srv/ClearEntireCostmap\n"])
@@ -139,18 +139,17 @@ def test_the_text_of_an_action_becomes_its_feedback_and_its_calls():
     )
     name = "nav2_msgs/action/Tour"
 
-    feedback = get_types_from_msg(
-        message_definition(f"{name}_FeedbackMessage", text), f"{name}_FeedbackMessage"
-    )
-    sent = get_types_from_msg(
-        message_definition(f"{name}_SendGoal_Event", text), f"{name}_SendGoal_Event"
+    kind = as_message(name)
+    feedback, sent = (
+        get_types_from_msg(message_definition(f"{name}_{part}", text), f"{kind}_{part}")
+        for part in ("FeedbackMessage", "SendGoal_Event")
     )
     result = message_definition(f"{name}_GetResult_Event", text)
 
-    assert [f[0] for f in feedback[f"{name}_FeedbackMessage"][1]] == ["goal_id", "feedback"]
-    assert feedback[f"{name}_Feedback"][1][1][1][1][0][1] == "nav2_msgs/msg/WaypointStatus"
-    assert [f[0] for f in sent[f"{name}_SendGoal_Request"][1]] == ["goal_id", "goal"]
-    assert [f[0] for f in sent[f"{name}_SendGoal_Event"][1]] == ["info", "request", "response"]
+    assert [f[0] for f in feedback[f"{kind}_FeedbackMessage"][1]] == ["goal_id", "feedback"]
+    assert feedback[f"{kind}_Feedback"][1][1][1][1][0][1] == "nav2_msgs/msg/WaypointStatus"
+    assert [f[0] for f in sent[f"{kind}_SendGoal_Request"][1]] == ["goal_id", "goal"]
+    assert [f[0] for f in sent[f"{kind}_SendGoal_Event"][1]] == ["info", "request", "response"]
     assert "structure_needs_at_least_one_member" in result  # a result of constants alone
 
 

@@ -4,9 +4,10 @@ from functools import cache
 
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from slamreplay.ingest import DECODERS
 from slamreplay.messages.definitions import DEFINITIONS, LATER_DEFINITIONS
+from slamreplay.messages.interfaces import as_message
 from slamreplay.messages.layouts import layouts
+from slamreplay.messages.recoveries import INTERFACES
 
 
 @cache
@@ -16,14 +17,14 @@ def type_store(ros=2, *, later=False):
     for name, text in (DEFINITIONS | LATER_DEFINITIONS if later else DEFINITIONS).items():
         if name not in store.fielddefs:
             store.register(get_types_from_msg(text, name))
-    for name in DECODERS if ros == 2 else ():
-        if "/msg/" not in name:  # parts of services and actions
+    for base in INTERFACES if ros == 2 else ():
+        parts = ["Event"] if "/srv/" in base else ["FeedbackMessage", "SendGoal_Event"]
+        for name in (f"{base}_{part}" for part in parts):
             register_layout(store, name, layouts(name)[0 if later else -1])
     return store
 
 
 def register_layout(store, name, text):
-    """Add a type in one of its layouts, with the types it needs, to a type store of ROS 2."""
-    root, *others = get_types_from_msg(text, name).items()
-    wanted = {name: root[1], **dict(others)}  # rosbags knows no names of the form pkg/srv/X
-    store.register({k: v for k, v in wanted.items() if k not in store.fielddefs})
+    """Add a type in one of its layouts, with the types it needs, to a type store."""
+    found = get_types_from_msg(text, as_message(name))
+    store.register({k: v for k, v in found.items() if k not in store.fielddefs})

@@ -6,7 +6,7 @@ import hashlib
 import io
 import json
 import shutil
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Protocol
 
@@ -159,6 +159,20 @@ def read_table(path: Path, manifest: Manifest, name: str) -> Table:
     _check(file, manifest, name)
     try:
         return Table.from_arrow(TABLES[name], pq.read_table(file, memory_map=False))
+    except pa.ArrowException as error:
+        raise BundleError(f"not a readable Parquet file: {error}", where=file) from error
+
+
+def read_columns(path: Path, manifest: Manifest, name: str, columns: Sequence[str]) -> pa.Table:
+    """Some columns of a table as Arrow has them, the file checked as by `read_table`.
+
+    Raises:
+        BundleError: missing, changed since it was written, or unreadable.
+    """
+    file = path / "tables" / f"{name}.parquet"
+    _check(file, manifest, name)
+    try:
+        return pq.read_table(file, columns=list(columns), memory_map=False)
     except pa.ArrowException as error:
         raise BundleError(f"not a readable Parquet file: {error}", where=file) from error
 

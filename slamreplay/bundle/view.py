@@ -9,14 +9,17 @@ from pathlib import Path
 from types import MappingProxyType
 
 import numpy as np
+import pyarrow.compute as pc
 
+from slamreplay.bundle.arrow import numbers_from_arrow
 from slamreplay.bundle.manifest import Manifest
 from slamreplay.bundle.map_course import Held, MapStretch, map_course, map_stretches
 from slamreplay.bundle.placeholders import without_placeholders
 from slamreplay.bundle.schema import JUDGING_KINDS, SENSED_KINDS, TABLES
-from slamreplay.bundle.store import read_grid, read_manifest, read_table
+from slamreplay.bundle.store import read_columns, read_grid, read_manifest, read_table
 from slamreplay.bundle.tables import Table
 from slamreplay.errors import UsageError
+from slamreplay.geometry.times import Times
 from slamreplay.geometry.transforms import Edge, TransformBuffer
 from slamreplay.maps.grid import OccupancyGrid
 
@@ -76,6 +79,16 @@ class Bundle:
                 else Table.empty(TABLES[name])
             )
         return self._tables[name]
+
+    def log_times(self, name: str, topic: str) -> Times:
+        """(N,) log times of a topic's rows in a table, without reading the table's numbers."""
+        if name in self._tables or self.path is None:
+            table = self.table(name)
+            return np.asarray(table["t_log_ns"][table["topic"] == topic])
+        columns = read_columns(self.path, self.manifest, name, ("topic", "t_log_ns"))
+        mine = pc.equal(columns["topic"], topic)
+        found = columns["t_log_ns"].filter(mine).combine_chunks()
+        return numbers_from_arrow(found, np.int64)
 
     def evidence(self, name: str) -> Table:
         """A table by name, NaN where a number is only a placeholder (bundle.placeholders)."""

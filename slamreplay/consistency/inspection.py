@@ -51,7 +51,7 @@ def summary(bundle: Bundle) -> dict[str, Any]:
         ],
         "missing": [m.model_dump() for m in manifest.missing],
         "tables": {name: entry.rows for name, entry in manifest.tables.items()},
-        "maps": [m.model_dump() for m in manifest.maps],
+        "maps": [m.model_dump(mode="json") for m in manifest.maps],
         "losses": [loss.model_dump() for loss in manifest.losses],
     }
 
@@ -82,10 +82,10 @@ def inspect(bundle: Bundle) -> dict[str, Any]:
 
 def _role_rate(bundle: Bundle, role: str, topic: str) -> float | None:
     """Of the topic in its role's table; where tf plays it, in that of tf, whatever it is called."""
-    for table in (bundle.table(ROLE_TABLES[role]), bundle.table("transforms")):
-        mine = table["topic"] == topic
-        if mine.any():
-            return _rate(table["t_log_ns"][mine])
+    for name in (ROLE_TABLES[role], "transforms"):
+        t_log_ns = bundle.log_times(name, topic)
+        if len(t_log_ns):
+            return _rate(t_log_ns)
     return None
 
 

@@ -95,7 +95,7 @@ DECODERS = Registry(
             for service in _CLEARINGS
         },
         "std_srvs/srv/Empty_Event": f"{_HERE}.service_event:EMPTY",
-        "nav2_msgs/srv/SetInitialPose_Event": f"{_HERE}.service_event:INITIAL_POSE",
+        "nav2_msgs/srv/SetInitialPose_Event": f"{_HERE}.set_initial_pose:SET_INITIAL_POSE",
         "move_base_msgs/msg/MoveBaseActionGoal": f"{_HERE}.move_base:GOAL",
         "move_base_msgs/msg/MoveBaseActionFeedback": f"{_HERE}.move_base:FEEDBACK",
         "move_base_msgs/msg/MoveBaseActionResult": f"{_HERE}.move_base:RESULT",

@@ -18,7 +18,7 @@ from slamreplay.ingest.decoders.recovery_rows import recovery_columns
 from slamreplay.ingest.names import basename
 from slamreplay.ingest.rows import TopicRows
 
-_LOGS = frozenset({"rcl_interfaces/msg/Log", "rosgraph_msgs/msg/Log"})
+_LOGS = frozenset({"rcl_interfaces/msg/Log", "rosgraph_msgs/msg/Log", "foxglove_msgs/msg/Log"})
 #: Lines of behaviours, whose group is the behaviour: only those called like a recovery count.
 _BEHAVIOURS = (
     (re.compile(r"(?:Running|Attempting) (\S+)"), "running"),

@@ -10,7 +10,7 @@ from slamreplay.errors import LogError
 from slamreplay.ingest.readers.reader import Connection
 from slamreplay.ingest.wire.layout import Struct, UnknownLayoutError, layout_of
 from slamreplay.messages.definitions import DEFINITIONS
-from slamreplay.messages.interfaces import message_definition
+from slamreplay.messages.interfaces import as_message, message_definition
 from slamreplay.messages.layouts import layouts as shipped_layouts
 
 if TYPE_CHECKING:
@@ -30,15 +30,15 @@ def layouts(connection: Connection) -> list[Struct]:
     Raises:
         LogError: the type has no (readable) definition.
     """
-    name, encoding = connection.type, connection.encoding
-    own = message_definition(name, connection.definition)
+    name, encoding = as_message(connection.type), connection.encoding
+    own = message_definition(connection.type, connection.definition)
     form = connection.definition_format
     try:
         if own:
             return [layout_of(name, _own(encoding, name, form, own), encoding)]
         if name in _store(encoding):
             return [layout_of(name, _with_needed({}, name, encoding), encoding)]
-        known = [_own(encoding, name, "msg", text) for text in shipped_layouts(name)]
+        known = [_own(encoding, name, "msg", t) for t in shipped_layouts(connection.type)]
         found = [layout_of(name, definitions, encoding) for definitions in known]
     except UnknownLayoutError as error:
         raise LogError(f"its definition cannot be used: {error}") from error
@@ -60,8 +60,6 @@ def _own(encoding: str, name: str, form: str, text: str) -> Mapping[str, Any]:
 
     try:
         found = get_types_from_idl(text) if form == "idl" else get_types_from_msg(text, name)
-        if "/srv/" in name:  # rosbags knows no names of this form
-            found = {name: found.pop(next(iter(found))), **found}
     except Exception as error:  # a parser of foreign text fails in many ways
         raise LogError(f"its definition cannot be read: {str(error).splitlines()[0]}") from error
     return _with_needed(found, name, encoding)

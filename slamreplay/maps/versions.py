@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import maximum_filter
 
 from slamreplay.geometry import se2
 from slamreplay.maps.grid import FREE_TO, OCCUPIED_FROM, OccupancyGrid
@@ -71,7 +70,7 @@ def same_place(old: OccupancyGrid, new: OccupancyGrid) -> bool:
 
 def _faces(grid: OccupancyGrid) -> NDArray[np.int64]:
     """(N, 2) wall cells beside free ones: thick walls count by what can be seen of them."""
-    return np.argwhere(grid.occupied & maximum_filter(grid.free, 3))
+    return np.argwhere(grid.occupied & _largest_near(grid.free, 3))
 
 
 def _has_wall(grid: OccupancyGrid, xy_m: se2.Array) -> NDArray[np.bool_]:
@@ -81,8 +80,15 @@ def _has_wall(grid: OccupancyGrid, xy_m: se2.Array) -> NDArray[np.bool_]:
     """
     found = np.zeros(len(xy_m), dtype=bool)
     # A square filter takes a third of the time of a distance transform.
-    near = maximum_filter(grid.occupied, 2 * round(NEAR_M / grid.resolution_m) + 1)
+    near = _largest_near(grid.occupied, 2 * round(NEAR_M / grid.resolution_m) + 1)
     cell = grid.cell_of(xy_m)
     inside = grid.inside(cell)
     found[inside] = near[tuple(cell[inside].T)]
     return found
+
+
+def _largest_near(cells: NDArray[np.bool_], size: int) -> NDArray[np.bool_]:
+    """Cells with a true one in the square of `size` cells around them."""
+    from scipy.ndimage import maximum_filter  # takes longer to load than most logs to ingest
+
+    return np.asarray(maximum_filter(cells, size))

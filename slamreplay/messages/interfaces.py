@@ -28,6 +28,11 @@ _EMPTY = "uint8 structure_needs_at_least_one_member"
 _CONSTANT = re.compile(r"\S+\s+\w+\s*=")
 
 
+def as_message(type_name: str) -> str:
+    """The name by which parsers of definitions know a part of a service or action: pkg/msg/T."""
+    return type_name.replace("/srv/", "/msg/").replace("/action/", "/msg/")
+
+
 def base_interface(type_name: str) -> str:
     """The service or action a message type belongs to ("pkg/action/Spin"), "" for a plain one."""
     match = _DERIVED.fullmatch(type_name)
@@ -56,14 +61,12 @@ def message_definition(type_name: str, text: str) -> str:
     if len(parts) != (2 if match["kind"] == "srv" else 3):
         return text
     own = _of_service if match["kind"] == "srv" else _of_action
-    sections = own(match["base"], match["part"], parts)
+    sections = own(as_message(match["base"]), match["part"], parts)
     return "".join([sections[0], *(f"{SEPARATOR}{s}" for s in [*sections[1:], *rest])])
 
 
 def _of_service(base: str, _part: str, parts: list[str]) -> list[str]:
-    # Parsers of definitions know no names of the form pkg/srv/X, so the two are called messages.
-    call = base.replace("/srv/", "/msg/")
-    return [_event(call), *_call(call, *parts)]
+    return [_event(base), *_call(base, *parts)]
 
 
 def _of_action(base: str, part: str, parts: list[str]) -> list[str]:

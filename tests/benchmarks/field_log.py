@@ -1,7 +1,7 @@
 """A warehouse robot's log for the reading benchmarks: what it holds is what such logs hold.
 
 Odometry 50 Hz, IMU 200 Hz, scans of 1081 beams at 15 Hz, tf 50 Hz and 15 Hz, a local costmap 5 Hz,
-a behaviour tree 1 Hz, wheels 50 Hz that nobody decodes, and where asked a camera. Numbers are
+a behaviour tree 1 Hz, wheels 50 Hz, and where asked a camera. Numbers are
 noise that compresses about as well as real ones do.
 """
 

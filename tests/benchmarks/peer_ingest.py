@@ -28,9 +28,9 @@ def main(log: Path, folder: Path) -> None:
     for number, ((topic, kind), found) in enumerate(sorted(columns.items())):
         arrays = [arrow(c) for c in found[:-1] or found]
         if PICK[kind][2]:  # the last column is ragged: all rows in this log have one length
-            rows = len(times[topic])
-            offsets = np.arange(rows + 1, dtype=np.int32) * (len(found[-1]) // rows)
-            arrays.append(pa.ListArray.from_arrays(pa.array(offsets), pa.array(found[-1])))
+            rows, values = len(times[topic]), found[-1].ravel()
+            offsets = np.arange(rows + 1, dtype=np.int32) * (len(values) // rows)
+            arrays.append(pa.ListArray.from_arrays(pa.array(offsets), pa.array(values)))
         else:
             arrays.append(arrow(found[-1]))
         names = [f"c{k}" for k in range(len(arrays))]

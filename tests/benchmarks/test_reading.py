@@ -87,6 +87,11 @@ def _tree(m):
             for e in m.event_log]  # fmt: skip
 
 
+def _joints(m):
+    values = zip(m.name, m.position, m.velocity, strict=True)
+    return [(_stamp(m), name, position, velocity) for name, position, velocity in values]
+
+
 #: Type to (how its fields are picked, whether a message gives several rows, ragged last column).
 PICK = {
     field_log.ODOM: (_odometry, False, False),
@@ -95,6 +100,7 @@ PICK = {
     field_log.TF: (_tf, True, False),
     field_log.GRID: (_grid, False, True),
     field_log.TREE: (_tree, True, False),
+    field_log.JOINTS: (_joints, True, False),
 }
 
 

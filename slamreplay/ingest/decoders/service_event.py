@@ -1,4 +1,4 @@
-"""Events of services under introspection: recoveries called, goals sent, initial poses set.
+"""Events of services under introspection: recoveries called, and goals sent to actions.
 
 A call is seen up to four times: sent and received by either side. The first that is in the log
 counts, once for the request and once for the answer. Requests and answers are sequences of one
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from slamreplay.bundle.recoveries import NAVIGATIONS
 from slamreplay.ingest.action_names import action_of, is_recovery, service_of
-from slamreplay.ingest.decoders.checks import kept, pose_rows
+from slamreplay.ingest.decoders.checks import kept
 from slamreplay.ingest.decoders.decoder import Decoded, Decoder, Messages, Remark
 from slamreplay.ingest.decoders.recovery_rows import (
     Texts,
@@ -72,25 +72,6 @@ def _goal_sent(messages: Messages) -> Decoded:
     return kept(keep, columns, messages.every, messages.stamps("info.stamp"), remarks)
 
 
-def _initial_pose(messages: Messages) -> Decoded:
-    """The pose in each request to the localizer."""
-    call, is_answer = _calls(messages)
-    asked = first_of_each(call) & ~is_answer
-    requests, rows = messages.take(asked).children("request")
-    orientation, keep, remarks = pose_rows(
-        requests.columns("pose.pose.pose.position", "xyz"),
-        requests.columns("pose.pose.pose.orientation", "xyzw"),
-    )
-    columns = {
-        "frame_id": requests.frames("pose.header.frame_id"),
-        "position_xyz": requests.columns("pose.pose.pose.position", "xyz"),
-        "orientation_xyzw": orientation,
-        "covariance": requests.fixed("pose.pose.covariance", 36),
-    }
-    stamps = requests.stamps("pose.header.stamp")
-    return kept(keep, columns, np.flatnonzero(asked)[rows], stamps, remarks)
-
-
 def _calls(messages: Messages) -> tuple[Texts, NDArray[np.bool_]]:
     """(N,) which call each event is of, as client and number, and whether it is an answer."""
     client = hexadecimal(messages.fixed("info.client_gid", 16))
@@ -103,4 +84,3 @@ def _calls(messages: Messages) -> tuple[Texts, NDArray[np.bool_]]:
 CLEARING = Decoder("recoveries", _recovery)
 EMPTY = Decoder("recoveries", _empty)
 GOAL_SENT = Decoder("recoveries", _goal_sent)
-INITIAL_POSE = Decoder("initial_poses", _initial_pose)

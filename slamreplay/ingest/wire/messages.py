@@ -45,6 +45,7 @@ class WireMessages(Messages):
         super().__init__((), t_log_ns, topic)
         self._data = data
         self._place = place
+        self._codes: dict[str, tuple[list[str], NDArray[np.int64]]] = {}
 
     def __len__(self) -> int:
         return len(self.t_log_ns)
@@ -149,20 +150,29 @@ class WireMessages(Messages):
 
     def _texts(self, path: str, change: Callable[[str], str]) -> NDArray[Any]:
         """Texts, each distinct one decoded and changed once."""
+        words, codes = self._coded(path)
+        changed = np.array([*map(change, words), ""], dtype=object)[:-1]
+        return changed[codes]
+
+    def _coded(self, path: str) -> tuple[list[str], NDArray[np.int64]]:
+        """Distinct texts, and for each message which of them it has; found once for each field."""
+        if path in self._codes:
+            return self._codes[path]
         place = self._found(path, TextPlace)
-        out = np.empty(len(self), dtype=object)
         if isinstance(place.lengths, int):
             groups = [(place.lengths, np.arange(len(self)))]
         else:
             lengths = place.lengths
             groups = [(int(n), np.flatnonzero(lengths == n)) for n in np.unique(lengths)]
+        words: list[str] = []
+        codes = np.empty(len(self), dtype=np.int64)
         for length, index in groups:
             raw = gather(self._data, place.base[index], place.offset, length)
-            distinct, codes = _distinct(raw)
-            words = np.empty(len(distinct), dtype=object)
-            words[:] = [change(bytes(word).decode("utf-8", "replace")) for word in distinct]
-            out[index] = words[codes]
-        return out
+            distinct, own = _distinct(raw)
+            codes[index] = own + len(words)
+            words += [bytes(word).decode("utf-8", "replace") for word in distinct]
+        self._codes[path] = words, codes
+        return words, codes
 
 
 def _cast(values: NDArray[Any], dtype: Any) -> NDArray[Any]:
