@@ -52,6 +52,7 @@ def write_parquet(rows: Rows, schema: TableSchema, path: Path) -> None:
     with pq.ParquetWriter(path, arrow, compression="zstd", use_dictionary=text) as writer:
         for group in rows.groups():
             writer.write_table(group.to_arrow())
+            pa.default_memory_pool().release_unused()  # else it keeps what the last group took
 
 
 def write_bundle(

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 #: Bytes of a row group: what is held at once while a large table is written or read.
-GROUP_BYTES = 128_000_000
+GROUP_BYTES = 32_000_000
 
 _DTYPES: dict[str, Any] = {
     "int64": np.int64,

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slamreplay.bundle.manifest import Frames, Loss
-from slamreplay.bundle.no_return import told_as_range_max
+from slamreplay.bundle.no_return import is_code, tally
 from slamreplay.geometry import se3
 from slamreplay.geometry.times import NO_STAMP
 from slamreplay.geometry.transforms import Edge, TransformBuffer
@@ -32,6 +32,8 @@ _FIXED_M, _FIXED_RAD = 0.02, 0.02
 _TILT_RAD = 0.1
 _FEWEST_BEAMS = 20
 _LOOKS = 40
+#: Scans that are looked at in one go where all of them are.
+_AT_ONCE = 5000
 
 
 def second_scan(
@@ -172,9 +174,14 @@ def no_returns(topics: Sequence[TopicRows]) -> list[Loss]:
     for topic in topics:
         if topic.table != "scans" or not len(topic):
             continue
-        ranges = topic.columns["ranges_m"]
-        far = ranges.spread(topic.columns["range_max_m"])
-        count = int(np.count_nonzero(told_as_range_max(ranges.values, far)))
+        at, before = 0, 0
+        for start in range(0, len(topic), _AT_ONCE):
+            # Asked for anew each time: columns on disk are in memory while somebody holds them.
+            rows = slice(start, min(start + _AT_ONCE, len(topic)))
+            ranges = topic.columns["ranges_m"].rows(rows.start, rows.stop)
+            told = tally(ranges.values, ranges.spread(topic.columns["range_max_m"][rows]))
+            at, before = at + told[0], before + told[1]
+        count = at if is_code(at, before) else 0
         if count:
             reason = "beams of exactly range_max are read as beams without a return"
             losses.append(Loss(kind="repaired", what=topic.topic, count=count, reason=reason))

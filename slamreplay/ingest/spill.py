@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from slamreplay.bundle.tables import Ragged
 
 #: Bytes of rows that are kept in memory.
-MEMORY_BYTES = 400_000_000
+MEMORY_BYTES = 200_000_000
 #: Columns with fewer bytes a row (times, names, single numbers) always stay in memory.
 _WIDE_BYTES = 16
 
