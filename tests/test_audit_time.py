@@ -1,12 +1,14 @@
 """The time audit: each fault of a clock is found, its size told, and a sound log is left alone."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from audited import edited, findings, healthy, on_edge, restamped, with_manifest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from slamreplay.audit.delays import delays
+from slamreplay.audit.delays import Jump, delays
 from slamreplay.audit.leads import lead
 from slamreplay.audit.log_audit import LogAudit, key
 from slamreplay.audit.rates import odd_stamps, rate
@@ -15,6 +17,7 @@ from slamreplay.bundle.manifest import Clock
 from slamreplay.bundle.schema import TABLES, Column, TableSchema
 from slamreplay.bundle.tables import Table
 from slamreplay.bundle.view import Bundle
+from slamreplay.consistency.clock import _jumps as clock_jumps
 from slamreplay.geometry.times import NO_STAMP, NS_PER_S
 from slamreplay.testing.synthetic import START_NS
 
@@ -405,3 +408,17 @@ def test_streams_of_tf_are_edges_and_a_topic_may_fill_two_tables(sound):
     assert "/tf odom -> base_link (transforms)" in names
     assert all((np.diff(s.t_log_ns) >= 0).all() for s in audit.streams)
     assert not any(s.table == "references" for s in audit.streams)  # they only judge
+
+
+def test_a_clock_that_jumps_all_the_time_is_one_finding():
+    times = np.array([EPOCH])
+    laser = Stream("/scan", "scans", None, is_static=False, rows=np.arange(1), t_ns=times,
+                   t_sensor_ns=times, t_log_ns=times)  # fmt: skip
+    for count, findings_told in ((4, 4), (40, 1)):
+        told = [Jump(EPOCH + k * 10 * SECOND, 0.3 + k / 100, 0.1) for k in range(count)]
+        late = SimpleNamespace(jumps=tuple(told))
+        audit = SimpleNamespace(sensors=[laser], delays={key(laser): late})
+        found = clock_jumps(audit, CLOCK)
+        assert len(found) == findings_told
+    assert "/scan jumped 40 times against the log time, by up to 0.690 s" in found[0].message
+    assert (found[0].start_ns, found[0].end_ns) == (EPOCH, EPOCH + 390 * SECOND)

@@ -68,7 +68,8 @@ def _of_topic(rows: Table, topic: str, map_frame: str | None) -> list[OddNumbers
     for column in _MEASURED.get(name, ()):
         none = ~np.isfinite(rows[column]).all(axis=1)
         # ingest has NaN for what an Imu marks as not measured.
-        fault = NOT_GIVEN if name == "imu" else NOT_FINITE
+        # A column without any number was not measured either: text logs, steered wheels.
+        fault = NOT_GIVEN if name == "imu" or none.all() else NOT_FINITE
         faults.append((column, fault, none))
     for column, fault, mask in faults:
         if mask.any():

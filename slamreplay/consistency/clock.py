@@ -107,7 +107,21 @@ def _jumps(audit: LogAudit, clock: Clock) -> tuple[Finding, ...]:
         else:
             groups.append([(jump, stream)])
     stamped = sum(audit.delays[key(s)] is not None for s in audit.sensors)
+    if len(groups) > _NAMED:
+        return (_many_jumps(groups, clock),)
     return tuple(_jump(group, clock, stamped) for group in groups)
+
+
+def _many_jumps(groups: list[list[tuple[Jump, Stream]]], clock: Clock) -> Finding:
+    """One finding for a clock that jumps all the time: each by itself would bury all others."""
+    worst = max(groups, key=lambda group: abs(group[0][0].seconds))[0][0].seconds
+    names = sorted({stream.name for group in groups for _, stream in group})
+    text = f"stamps of {listed(names)} jumped {len(groups)} times against the log time, by up to "
+    ends = np.array([group[0][0].t_log_ns for group in (groups[0], groups[-1])])
+    start, end = (int(t) for t in clock.from_log_time(ends))
+    severity: Severity = "warning" if abs(worst) >= JUMP_S else "info"
+    return Finding("SR-CLK-003", severity, f"{text}{abs(worst):.3f} s", start, end, value=worst,
+                   unit="s", n=len(groups))  # fmt: skip
 
 
 def _jump(group: list[tuple[Jump, Stream]], clock: Clock, stamped: int) -> Finding:
