@@ -14,7 +14,7 @@ from slamreplay.geometry.times import Times
 from slamreplay.messages.foxglove import SCHEMA_PREFIX, TYPE_PREFIX
 
 #: Bytes of a container that are held and decoded at a time.
-WINDOW_BYTES = 32_000_000
+WINDOW_BYTES = 24_000_000
 
 
 @dataclass(frozen=True)
