@@ -116,7 +116,9 @@ def assert_same_field(messages, values, node, at):
                 ragged[row], np.asarray(value).astype(ragged.values.dtype)
             )
         if node.count:
-            rows = np.array(values, dtype=np.float64).reshape(-1, node.count)
+            # rosbags has ROS 2's byte, an octet, as a signed number.
+            kind = np.dtype(node.element.dtype)
+            rows = np.array(values).astype(kind).reshape(-1, node.count).astype(np.float64)
             np.testing.assert_array_equal(messages.fixed(at, node.count), rows)
     else:
         children, rows = messages.children(at)
