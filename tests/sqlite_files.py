@@ -92,9 +92,10 @@ def rows(path):
 
 
 def places(path):
-    """Pages that each message of a sound file needs, {(topic, time, data): {page}}, and their size.
+    """Pages that each message of a sound file needs, and the size of a page.
 
-    An implementation of the format of its own: cell by cell, in plain Python.
+    The first is {(topic, time, data): [leaf, *overflow]}. An implementation of the format of its
+    own: cell by cell, in plain Python.
     """
     uri = f"{Path(path).resolve().as_uri()}?mode=ro&immutable=1"
     with closing(sqlite3.connect(uri, uri=True)) as database:
@@ -120,7 +121,7 @@ def _walk(content, size, usable, page):
         else:
             payload, at = _varint(content, at)
             rowid, at = _varint(content, at)
-            yield rowid, {page, *_chain(content, size, usable, payload, at)}
+            yield rowid, [page, *_chain(content, size, usable, payload, at)]
     if header == 12:
         right = int.from_bytes(content[start + 8 : start + 12])
         yield from _walk(content, size, usable, right)

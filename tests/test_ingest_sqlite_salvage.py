@@ -22,6 +22,7 @@ from sqlite_files import (
     write_db3,
 )
 
+from slamreplay.ingest.readers.sqlite.overflow import Chains
 from slamreplay.ingest.readers.sqlite.salvage import salvage
 
 MIXED = [
@@ -300,10 +301,7 @@ def differing(one, other):
 
 def test_a_damaged_byte_above_the_leaves_costs_nothing(sound):
     messages, page_size = sound.messages, sound.page_size
-    with closing(sqlite3.connect(sound.path)) as database:
-        statement = "SELECT rootpage FROM sqlite_master WHERE name = 'messages'"
-        (root,) = database.execute(statement).fetchone()
-    start = (root - 1) * page_size
+    start = root_of_messages(sound)
     used = [at for at in range(start, start + page_size) if sound.content[at]]
     assert sound.content[start] == 5
     for at, flip in zip(used[1:] * 2, cycle([1, 0x80, 3, 0x10, 0x40]), strict=False):
@@ -314,9 +312,84 @@ def test_a_damaged_byte_above_the_leaves_costs_nothing(sound):
         assert salvaged.lost == 0
 
 
+def root_of_messages(sound):
+    """Where in a file the root page of messages starts: an interior page."""
+    with closing(sqlite3.connect(sound.path)) as database:
+        statement = "SELECT rootpage FROM sqlite_master WHERE name = 'messages'"
+        (root,) = database.execute(statement).fetchone()
+    return (root - 1) * sound.page_size
+
+
+def test_children_named_twice_hide_no_others(sound):
+    start = root_of_messages(sound)
+    count = int.from_bytes(sound.content[start + 3 : start + 5])
+    slots = range(start + 12, start + 12 + 2 * count, 2)
+    for slot, other in zip(slots, [*slots[1:], *slots[:1]], strict=True):
+        for whole_cell in (True, False):
+            content = bytearray(sound.content)
+            if whole_cell:
+                content[slot : slot + 2] = content[other : other + 2]
+            else:
+                at, its = (
+                    start + int.from_bytes(content[place : place + 2]) for place in (slot, other)
+                )
+                content[at : at + 4] = content[its : its + 4]
+            salvaged = salvage(damaged(sound.path, content))
+            assert list(salvaged.messages()) == sound.messages
+            assert salvaged.lost == 0
+
+
+@pytest.mark.parametrize("sizes", [(30000, 30000), (9000, 30000), (30000, 9000)])
+def test_chains_that_meet_are_both_lost(sound, sizes):
+    one = next(m for m in sound.messages if len(m[2]) == sizes[0])
+    two = next(m for m in sound.messages if len(m[2]) == sizes[1] and m != one)
+    content = bytearray(sound.content)
+    at = (sound.needs[one][-2] - 1) * sound.page_size  # the last but one of its chain
+    assert content[at : at + 4] == sound.needs[one][-1].to_bytes(4)
+    content[at : at + 4] = sound.needs[two][-1].to_bytes(4)
+
+    salvaged = salvage(damaged(sound.path, content))
+
+    assert list(salvaged.messages()) == [m for m in sound.messages if m not in (one, two)]
+    assert salvaged.lost == 2
+
+
+@pytest.mark.parametrize("kind", [0, 2, 5, 10, 14])
+def test_the_last_page_is_missed_whatever_it_turns_into(sound, kind):
+    last = sound.needs[sound.messages[-1]][0]
+    content = bytearray(sound.content)
+    content[(last - 1) * sound.page_size] = kind
+
+    salvaged = salvage(damaged(sound.path, content))
+
+    assert list(salvaged.messages()) == [m for m in sound.messages if last not in sound.needs[m]]
+    assert salvaged.unread_bytes >= sound.page_size
+
+
+def test_a_chain_keeps_its_pages_from_one_claimed_later():
+    #         page: 0  1  2  3  4  5
+    links = np.array([0, 2, 3, 0, 2, 0])
+    chains = Chains(links, np.full(6, fill_value=True))
+
+    assert chains.claim(np.array([1]), np.array([3])).tolist() == [True]
+    assert chains.claim(np.array([5, 4]), np.array([1, 3])).tolist() == [True, False]
+    assert chains.pages(np.array([1, 5]), np.array([3, 1])).tolist() == [1, 2, 3, 5]
+
+
+def test_cells_that_never_were_are_not_lost(sound):
+    last = sound.needs[sound.messages[-1]][0]
+    content = bytearray(sound.content)
+    content[(last - 1) * sound.page_size + 4] = 0xFF  # so many cells there are not
+
+    salvaged = salvage(damaged(sound.path, content))
+
+    assert list(salvaged.messages()) == sound.messages
+    assert salvaged.lost <= 1  # more cannot be said of a damaged page at the end
+
+
 def test_a_damaged_byte_before_a_message_costs_that_message(sound):
     messages, page_size = sound.messages, sound.page_size
-    page = max(pages.pop() for pages in map(set, sound.needs.values()) if len(pages) == 1)
+    page = max(leaf for leaf, *chain in sound.needs.values() if not chain)
     start = (page - 1) * page_size
     count = int.from_bytes(sound.content[start + 3 : start + 5])
     for slot in range(start + 8, start + 8 + 2 * count, 2):
@@ -399,10 +472,29 @@ def test_numbers_given_twice_count_once(tmp_path):
     assert list(salvage(damaged(path, bytes(1024) + content[1024:])).messages()) == kept
 
 
+def test_numbers_given_twice_count_once_even_where_nobody_knows_the_free_pages(tmp_path):
+    path = tmp_path / "a.db3"
+    with_deleted(path)
+    again = some_messages([77] * 20, seed=9)
+    with closing(sqlite3.connect(path)) as database:
+        add_messages(database, again)
+        statement = "SELECT rootpage FROM sqlite_master WHERE name = 'messages'"
+        (root,) = database.execute(statement).fetchone()
+    kept = rows(path)
+    content = bytearray(path.read_bytes())
+    content[:1024] = bytes(1024)
+    content[(root - 1) * 1024 + 7] ^= 1  # the root is damaged: pages are looked for everywhere
+
+    found = list(salvage(damaged(path, content)).messages())
+
+    assert set(kept) < set(found)  # and some that were deleted
+    assert found[found.index(again[0]) : found.index(again[-1]) + 1] == again
+
+
 def test_a_lost_overflow_page_costs_its_message_only(sound):
     messages, needs, page_size = sound.messages, sound.needs, sound.page_size
     victim = max(needs, key=lambda message: len(message[2]))
-    (chain_page, *_) = sorted(needs[victim])[5:]
+    chain_page = needs[victim][5]
     content = bytearray(sound.content)
     content[(chain_page - 1) * page_size : chain_page * page_size] = bytes(page_size)
 

@@ -90,6 +90,20 @@ def test_a_damaged_write_ahead_log_is_read_as_sqlite_reads_it(logged, share, fli
     assert (salvaged.lost, salvaged.unread_bytes) == (0, 0)
 
 
+def test_every_byte_of_a_frames_header_counts(logged, tmp_path):
+    path, _ = logged
+    log = path.with_name(f"{path.name}-wal").read_bytes()
+    frame = 24 + int.from_bytes(log[8:12])
+    copy = tmp_path / path.name
+    shutil.copy(path, copy)
+    for at in [*range(32), *range(32 + 9 * frame, 32 + 9 * frame + 24)]:
+        content = bytearray(log)
+        content[at] ^= 4
+        copy.with_name(f"{copy.name}-wal").write_bytes(content)
+
+        assert list(salvage(copy).messages()) == read_by_sqlite(copy), at
+
+
 def test_a_log_whose_file_is_empty_still_has_its_messages(tmp_path):
     messages = some_messages([60, 300, 5000] * 20)
     with closing(sqlite3.connect(tmp_path / "live.db3")) as database:

@@ -80,7 +80,7 @@ class Block:
     def edges(self) -> Edges:
         """Children of the interior pages."""
         rows = np.flatnonzero(self.kinds == INTERIOR)
-        row, pointer, _ = self._pointers(rows, 12)
+        row, pointer = self._pointers(rows, 12)
         at = self.starts[row] + np.minimum(pointer, self.page_size)
         key, width = varints(self.flat, at + 4)
         sound = (pointer >= 12) & (pointer + 4 + width <= self._ends[row])
@@ -101,7 +101,7 @@ class Block:
     def cells(self) -> Cells:
         """Cells of the leaf pages."""
         rows = np.flatnonzero(self.kinds == LEAF)
-        row, pointer, slot = self._pointers(rows, 8)
+        row, pointer = self._pointers(rows, 8)
         at = self.starts[row] + np.minimum(pointer, self.page_size)
         payload, width = varints(self.flat, at)
         rowid, more = varints(self.flat, at + width)
@@ -113,8 +113,7 @@ class Block:
         size = width + local + 4 * spilled
         sound &= pointer + size <= self._ends[row]
         damaged = self._damaged(rows, row, np.where(sound, size, -1), rowid)
-        content = self._content(row)
-        placed = (slot < content) & (content <= pointer) & (pointer < self.usable)
+        placed = (self._content(row) <= pointer) & (pointer < self.usable)
         body = np.where(sound, at + width, 0)
         overflow = np.where(sound & spilled, unsigned(self.flat, body + local * sound, 4), 0)
         end = np.where(sound, pointer + size, 0)
@@ -132,18 +131,15 @@ class Block:
             self.numbers[rows[damaged]],
         )
 
-    def _pointers(self, rows: Ints, header: int) -> tuple[Ints, Ints, Ints]:
-        """Row, cell pointer and its own place of every cell of the pages at `rows`.
-
-        Pointers and places count from the page's start.
-        """
+    def _pointers(self, rows: Ints, header: int) -> tuple[Ints, Ints]:
+        """Row and cell pointer (from the page's start) of every cell of the pages at `rows`."""
         first = self.heads[rows] + header
         room = (self.starts[rows] + self.usable - first) // 6  # of the smallest cells
         counts = np.clip(unsigned(self.flat, self.heads[rows] + 3, 2), 0, np.maximum(room, 0))
         before = np.cumsum(counts) - counts
         within = np.arange(int(counts.sum())) - np.repeat(before, counts)
-        row, at = np.repeat(rows, counts), np.repeat(first, counts) + 2 * within
-        return row, unsigned(self.flat, at, 2), at - self.starts[row]
+        at = np.repeat(first, counts) + 2 * within
+        return np.repeat(rows, counts), unsigned(self.flat, at, 2)
 
     def _damaged(self, rows: Ints, row: Ints, sizes: Ints, keys: Ints) -> Mask:
         """Which pages cannot be as they were written.

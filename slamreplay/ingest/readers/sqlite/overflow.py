@@ -44,14 +44,11 @@ class Chains:
             at = page[going]
             whole[going[earlier[at]]] = False
             going, at = going[~earlier[at]], at[~earlier[at]]
-            before = self._owner[at]
-            met = before != _NOBODY
-            whole[before[met] - base] = False
-            whole[going[met]] = False
-            self._owner[at[~met]] = going[~met] + base
-            beaten = self._owner[at] != going + base  # two in this very step
-            whole[self._owner[at[beaten]] - base] = False
-            whole[going[beaten]] = False
+            nobodys = self._owner[at] == _NOBODY
+            self._owner[at[nobodys]] = going[nobodys] + base
+            theirs = self._owner[at] != going + base
+            whole[self._owner[at[theirs]] - base] = False
+            whole[going[theirs]] = False
             page[going] = self._links[at]
             step += 1
             going = going[counts[going] > step]

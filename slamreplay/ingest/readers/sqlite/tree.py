@@ -41,7 +41,7 @@ class Tree:
         leaves: (L,) its leaf pages.
         ranges: (L, 2) row ids (above, up to) that belong on each leaf.
         gaps: (H, 2) row ids (above, up to) that belong on pages that were not found.
-        holes: (H, 2) the same with safe bounds: one damaged key would not move them.
+        holes: (H, 2) the same, so wide that a damaged key does not hide any.
     """
 
     pages: Mask
@@ -61,14 +61,15 @@ def no_tree(count: int) -> Tree:
 def walk(structure: Structure, root: int) -> Tree:
     """Follow a tree down from its root, level by level.
 
-    A child is taken when its row ids fit between the keys around it. As one key may be damaged,
-    the next one on each side is the bound; where several parents claim a page, the one whose own
-    keys fit has it. A child that is not there or fits nowhere leaves a hole.
+    A child is taken when its row ids fit between the keys around it, at the place where they fit
+    best if it is named twice. A child that is not there or does not fit leaves a hole, and so does
+    an interior page that is damaged. The key that ends a hole may be damaged too: the hole goes on
+    to the key behind it.
     """
     pages = np.zeros(len(structure.kinds), dtype=bool)
     leaves, holes = [], []
-    # Columns: child, low, high, and bounds that a single damaged key would not move.
-    level = np.array([[root, LOWEST, HIGHEST, LOWEST, HIGHEST]], dtype=np.int64)
+    # Columns: child, the bounds of its row ids (above, up to), and the bound behind.
+    level = np.array([[root, LOWEST, HIGHEST, HIGHEST]], dtype=np.int64)
     while len(level):
         fits = _fits(structure, level, pages)
         holes.append(level[~fits])
@@ -81,18 +82,18 @@ def walk(structure: Structure, root: int) -> Tree:
         level = _children(structure, level)
     found, missing = np.concatenate(leaves), np.concatenate(holes)
     found = found[np.argsort(found[:, 0])]
-    return Tree(pages, found[:, 0], found[:, 1:3], missing[:, 1:3], missing[:, 3:])
+    return Tree(pages, found[:, 0], found[:, 1:3], missing[:, 1:3], missing[:, [1, 3]])
 
 
 def _fits(structure: Structure, level: Ints, taken: Mask) -> Mask:
-    child, low, high, lower, higher = level.T
+    child, low, high, higher = level.T
     child = np.where((child > 0) & (child < len(taken)), child, 0)
     kinds = structure.kinds[child]
-    smallest, largest = structure.smallest[child], structure.largest[child]
     fits = ((kinds == INTERIOR) | (kinds == LEAF)) & ~taken[child] & (child > 0)
-    fits &= (largest > lower) & (smallest <= higher)
-    exact = (smallest > low) & (largest <= high)
-    order = np.lexsort((~exact, ~fits, child))
+    smallest, largest = structure.smallest[child], structure.largest[child]
+    fits &= (largest > low) & (smallest <= higher)
+    inexact = (smallest <= low) | (largest > high)
+    order = np.lexsort((inexact, ~fits, child))
     again = np.zeros(len(level), dtype=bool)
     again[order[1:]] = child[order[1:]] == child[order[:-1]]
     return fits & ~again
@@ -105,15 +106,13 @@ def _children(structure: Structure, level: Ints) -> Ints:
     of = np.repeat(np.arange(len(level)), counts)
     within = np.arange(len(of)) - np.repeat(np.cumsum(counts) - counts, counts)
     edge = first[of] + within
-    is_first, is_last = within == 0, within == counts[of] - 1
-    _, low, high, lower, higher = level[of].T
-    key = structure.key[edge]
+    is_last = within == counts[of] - 1
+    _, low, high, higher = level[of].T
     # An edge's neighbours in these arrays are its siblings, but at the ends of a page.
-    high = np.where(is_last, high, key)
-    low = np.where(is_first, low, np.roll(high, 1))
-    lower = np.where(is_first, lower, np.minimum(low, np.roll(low, 1)))
+    high = np.where(is_last, high, structure.key[edge])
+    low = np.where(within == 0, low, np.roll(high, 1))
     higher = np.where(is_last, higher, np.maximum(high, np.roll(high, -1)))
-    return np.stack([structure.child[edge], low, high, lower, higher], axis=1)
+    return np.stack([structure.child[edge], low, high, higher], axis=1)
 
 
 def merged(ranges: Ints) -> Ints:
