@@ -660,3 +660,51 @@ def test_inspect_answers_for_everything(logs, robot, tmp_path):
 def test_format_page_is_the_schemas(request):
     page = request.config.rootpath / "slamreplay" / "bundle" / "FORMAT.md"
     assert page.read_text(encoding="utf-8") == format_page()
+
+
+@pytest.mark.parametrize("metadata", ["kept", "gone", "wrong"])
+@pytest.mark.parametrize("mode", ["FILE", "MESSAGE"])
+@pytest.mark.parametrize("storage", ["SQLITE3", "MCAP"])
+def test_compressed_folders_are_read_whatever_their_metadata_says(
+    logs, robot, tmp_path, storage, mode, metadata
+):
+    from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
+
+    store, connections = logs.stores[2], {}
+    writer = Writer(tmp_path / "packed", version=9, storage_plugin=StoragePlugin[storage])
+    writer.set_compression(CompressionMode[mode], CompressionFormat.ZSTD)
+    with writer:
+        for topic, kind, message, t_ns in robot.messages():
+            if topic not in connections:
+                connections[topic] = writer.add_connection(topic, kind, typestore=store)
+            writer.write(connections[topic], t_ns, store.serialize_cdr(message, kind))
+    about = tmp_path / "packed" / "metadata.yaml"
+    if metadata == "gone":
+        about.unlink()
+    elif metadata == "wrong":
+        about.write_text(about.read_text().replace("zstd", "").replace("message_count:", "n:"))
+
+    packed = ingest([tmp_path / "packed"], tmp_path / "packed.bundle")
+    plain = ingest([logs.write("plain.mcap", robot.messages())], tmp_path / "plain.bundle")
+
+    for name, entry in plain.manifest.tables.items():
+        assert packed.manifest.tables[name] == entry, name
+
+
+def test_a_compressed_message_that_is_damaged_is_counted(logs, robot, tmp_path):
+    import sqlite3
+
+    import zstandard
+
+    path = logs.write("log.db3", robot.messages())
+    with sqlite3.connect(path) as database:
+        rows = database.execute("SELECT id, data FROM messages").fetchall()
+        for number, data in rows:
+            packed = bytearray(zstandard.compress(data))
+            packed[6] ^= 0xFF if number == rows[5][0] else 0
+            database.execute("UPDATE messages SET data = ? WHERE id = ?", [bytes(packed), number])
+    database.close()
+
+    lost = [x for x in ingest([path], tmp_path / "b").manifest.losses if x.kind == "lost"]
+
+    assert sum(x.count for x in lost) == 1

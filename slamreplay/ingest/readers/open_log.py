@@ -11,11 +11,13 @@ from typing import Any
 
 import numpy as np
 import yaml
+from numpy.typing import NDArray
 
 from slamreplay.bundle.manifest import Loss, Source
 from slamreplay.errors import LogError
 from slamreplay.ingest.readers import mcap_file, ros1, sqlite_file
 from slamreplay.ingest.readers.reader import Block, Reader
+from slamreplay.ingest.wire.places import gather
 
 _ZSTD = b"\x28\xb5\x2f\xfd"
 _KINDS: list[tuple[bytes, str, Callable[[Path, Source], Reader]]] = [
@@ -38,7 +40,7 @@ def open_log(paths: Sequence[Path]) -> Iterator[tuple[list[Reader], list[Loss]]]
         readers: list[Reader] = []
         seen: set[str] = set()
         for path in paths:
-            for file, compression in _files(path, losses):
+            for file in _files(path, losses):
                 digest = _hash(file)
                 if digest in seen:
                     losses.append(
@@ -46,22 +48,19 @@ def open_log(paths: Sequence[Path]) -> Iterator[tuple[list[Reader], list[Loss]]]
                     )
                     continue
                 seen.add(digest)
-                readers.append(_open(file, digest, compression, stack))
+                readers.append(_open(file, digest, stack))
         if not readers:
             raise LogError("no storage file in it", where=paths[0] if paths else None)
         yield readers, losses
 
 
-def _files(path: Path, losses: list[Loss]) -> list[tuple[Path, str]]:
-    """Storage files of a path, each with its per-message compression ("" for none)."""
+def _files(path: Path, losses: list[Loss]) -> list[Path]:
+    """Storage files of a path."""
     if path.is_file():
-        return [(path, "")]
+        return [path]
     if not path.exists():
         raise LogError("no such file or folder", where=path)
     meta = _metadata(path / "metadata.yaml")
-    compression = ""
-    if str(meta.get("compression_mode", "")).lower() == "message":
-        compression = str(meta.get("compression_format", ""))
     listed = [str(name) for name in meta.get("relative_file_paths") or []]
     files = []
     for name in listed:
@@ -90,7 +89,7 @@ def _files(path: Path, losses: list[Loss]) -> list[tuple[Path, str]]:
             where=path,
             hint="give a .bag, .mcap or .db3, or a folder of rosbag2 or MRCLAM",
         )
-    return [(file, compression) for file in files]
+    return files
 
 
 def _metadata(path: Path) -> dict[str, Any]:
@@ -102,7 +101,7 @@ def _metadata(path: Path) -> dict[str, Any]:
     return meta if isinstance(meta, dict) else {}
 
 
-def _open(path: Path, digest: str, compression: str, stack: ExitStack) -> Reader:
+def _open(path: Path, digest: str, stack: ExitStack) -> Reader:
     file = path
     head = _head(path)
     if head.startswith(_ZSTD):
@@ -113,13 +112,17 @@ def _open(path: Path, digest: str, compression: str, stack: ExitStack) -> Reader
             size = path.stat().st_size
             source = Source(name=path.name, format=name, bytes=size, sha256=digest)
             opened = reader(file, source)
-            return _Decompressing(opened) if compression == "zstd" else opened
+            return opened if name == "ros1" else _Decompressing(opened)
     what = "the file is empty" if not head else "not a log that is known here"
     raise LogError(what, where=path, hint="a .bag, .mcap, .db3 or CARMEN .clf is expected")
 
 
 class _Decompressing:
-    """A reader whose messages are compressed one by one (rosbag2 compression_mode MESSAGE)."""
+    """A reader of a rosbag2 file whose messages may be compressed one by one with zstd.
+
+    Each message tells by its first bytes: metadata.yaml, which says so too, may be gone, and no
+    message that is not compressed begins like that (CDR begins with a zero).
+    """
 
     def __init__(self, inner: Reader) -> None:
         self._inner = inner
@@ -131,29 +134,38 @@ class _Decompressing:
         """See `Reader`."""
         if not self._broken:
             return self._inner.losses
-        what = f"{self.sources[0].name}: messages"
-        own = Loss(kind="lost", what=what, count=self._broken, reason="not zstd")
+        what, why = f"{self.sources[0].name}: messages", "their zstd compression is damaged"
+        own = Loss(kind="lost", what=what, count=self._broken, reason=why)
         return [*self._inner.losses, own]
 
     def blocks(self, wanted: Collection[int]) -> Iterator[Block]:
         """See `Reader`."""
+        self._broken = 0
+        of_ros2 = np.array([c.encoding == "cdr" for c in self.connections], dtype=bool)
+        for block in self._inner.blocks(wanted):
+            place = np.flatnonzero((block.end - block.start >= 4) & of_ros2[block.connection])
+            heads = gather(block.data, block.start[place], 0, 4)
+            is_packed = np.zeros(len(block), dtype=bool)
+            is_packed[place] = (heads == np.frombuffer(_ZSTD, dtype=np.uint8)).all(axis=1)
+            yield self._unpacked(block, is_packed) if is_packed.any() else block
+
+    def _unpacked(self, block: Block, is_packed: NDArray[np.bool_]) -> Block:
         import zstandard
 
-        self._broken = 0
-        for block in self._inner.blocks(wanted):
-            whole, payloads = [], []
-            view = memoryview(block.data.data)
-            for k, (a, b) in enumerate(zip(block.start.tolist(), block.end.tolist(), strict=True)):
-                try:
-                    stream = zstandard.ZstdDecompressor().decompressobj()
-                    payloads.append(stream.decompress(view[a:b]))
-                    whole.append(k)
-                except zstandard.ZstdError:
-                    self._broken += 1
-            end = np.cumsum([len(p) for p in payloads], dtype=np.int64)
-            data = np.frombuffer(b"".join(payloads), dtype=np.uint8)
-            start = np.concatenate([[0], end[:-1]]).astype(np.int64)
-            yield Block(data, block.connection[whole], start, end, block.t_log_ns[whole])
+        whole, payloads = [], []
+        view = memoryview(block.data.data)
+        bounds = zip(block.start.tolist(), block.end.tolist(), is_packed.tolist(), strict=True)
+        for k, (a, b, packed) in enumerate(bounds):
+            try:
+                stream = zstandard.ZstdDecompressor().decompressobj()
+                payloads.append(stream.decompress(view[a:b]) if packed else bytes(view[a:b]))
+                whole.append(k)
+            except zstandard.ZstdError:
+                self._broken += 1
+        end = np.cumsum([len(p) for p in payloads], dtype=np.int64)
+        data = np.frombuffer(b"".join(payloads), dtype=np.uint8)
+        start = np.concatenate([[0], end[:-1]]).astype(np.int64)
+        return Block(data, block.connection[whole], start, end, block.t_log_ns[whole])
 
 
 def _head(path: Path) -> bytes:
