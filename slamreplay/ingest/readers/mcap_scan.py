@@ -36,6 +36,8 @@ class Contents:
         chunks: in the order of the file.
         loose: (offset of the record, one past its end) of messages outside of chunks.
         cut: a chunk that the file ends in, by its first byte.
+        seen: sizes and checksums of the chunks that were passed over.
+        twice: chunks that are in the file a second time.
     """
 
     schemas: dict[int, m.Schema] = field(default_factory=dict)
@@ -44,6 +46,8 @@ class Contents:
     chunks: list[m.ChunkIndex] = field(default_factory=list)
     loose: list[tuple[int, int]] = field(default_factory=list)
     cut: int | None = None
+    seen: set[tuple[int, int]] = field(default_factory=set)
+    twice: int = 0
 
     def learn(self, opcode: int, record: Bytes) -> None:
         """A schema or channel; the first of a number counts, a broken one does not."""
@@ -110,6 +114,7 @@ def from_scan(path: Path, damage: Damage) -> Contents:
     size = path.stat().st_size
     with path.open("rb") as stream:
         at = len(m.MAGIC)
+        is_closed = False
         while at < size:
             stream.seek(at)
             head = stream.read(m.HEAD)
@@ -118,6 +123,7 @@ def from_scan(path: Path, damage: Damage) -> Contents:
                 end = at + m.HEAD + length
                 if 0 < opcode <= m.DATA_END and end <= size:
                     if opcode in (m.FOOTER, m.DATA_END):
+                        is_closed = True
                         break
                     _take(contents, stream, opcode, at, end)
                     at = end
@@ -133,6 +139,10 @@ def from_scan(path: Path, damage: Damage) -> Contents:
             if following is None:
                 break
             at = following
+    if not is_closed:
+        damage.mend("files", "it has no end: never closed, or cut")
+    if contents.twice:
+        damage.mend("chunks", "written twice, read once", contents.twice)
     return contents
 
 
@@ -151,6 +161,11 @@ def _take(contents: Contents, stream: BinaryIO, opcode: int, at: int, end: int) 
         try:
             head = m.chunk_head(record)
             packed = record[head.at : head.at + head.compressed]
+            content_of = (head.size, zlib.crc32(packed))
+            if content_of in contents.seen:  # stamps differ, so no two chunks are alike
+                contents.twice += 1
+                return
+            contents.seen.add(content_of)
             _count(contents, decompress(packed, head.compression, head.size))
             contents.chunks.append(m.ChunkIndex(at, end - at, 0, head.size, None))
         except (ValueError, struct.error):  # reading it tells

@@ -61,7 +61,8 @@ def _files(path: Path, losses: list[Loss]) -> list[Path]:
     if not path.exists():
         raise LogError("no such file or folder", where=path)
     meta = _metadata(path / "metadata.yaml")
-    listed = [str(name) for name in meta.get("relative_file_paths") or []]
+    told = meta.get("relative_file_paths")
+    listed = [str(name) for name in told] if isinstance(told, list) else []
     files = []
     for name in listed:
         places = [path / name, path / Path(name).name, path / f"{name}.zstd"]
@@ -95,7 +96,7 @@ def _files(path: Path, losses: list[Loss]) -> list[Path]:
 def _metadata(path: Path) -> dict[str, Any]:
     try:
         whole = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, yaml.YAMLError):
+    except (OSError, ValueError, RecursionError, yaml.YAMLError):  # ValueError: a month of 13
         return {}
     meta = whole.get("rosbag2_bagfile_information") if isinstance(whole, dict) else None
     return meta if isinstance(meta, dict) else {}

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 import struct
+import zlib
 from collections import Counter
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -42,12 +43,16 @@ class Contents:
         counts: messages by that number.
         chunks: in the order of the file.
         cut: first byte of a chunk that the file ends in.
+        seen: sizes and checksums of the chunks that were passed over.
+        twice: chunks that are in the file a second time.
     """
 
     connections: dict[int, Connection] = field(default_factory=dict)
     counts: Counter[int] = field(default_factory=Counter)
     chunks: list[Chunk] = field(default_factory=list)
     cut: int | None = None
+    seen: set[tuple[int, int]] = field(default_factory=set)
+    twice: int = 0
 
     def learn(self, header: r.Header, data: Bytes) -> None:
         """A connection record; the first of a number counts."""
@@ -130,6 +135,9 @@ def from_scan(path: Path, damage: Damage) -> Contents:
             if following is None:
                 break
             at = following
+    damage.mend("files", "read without an index: never closed, cut, or its index is broken")
+    if contents.twice:
+        damage.mend("chunks", "written twice, read once", contents.twice)
     return contents
 
 
@@ -137,6 +145,11 @@ def _take(contents: Contents, header: r.Header, data: bytes, at: int, end: int) 
     kind = r.opcode(header)
     if kind == r.CHUNK:
         size = r.u32(header[b"size"])
+        content_of = (size, zlib.crc32(data))
+        if content_of in contents.seen:  # stamps differ, so no two chunks are alike
+            contents.twice += 1
+            return
+        contents.seen.add(content_of)
         contents.chunks.append(Chunk(at, end, size))
         try:
             _count(contents, decompress(data, codec_of(header), size))

@@ -37,6 +37,7 @@ class SqliteReader:
         self._path = path
         self._salvaged: Salvaged | None = None
         try:
+            _check_size(path)
             with self._database() as database:
                 tables = {r[0] for r in database.execute("SELECT name FROM sqlite_master")}
                 if not {"topics", "messages"} <= tables:
@@ -52,7 +53,7 @@ class SqliteReader:
                     )
                     texts = {r[0]: (r[1], r[2]) for r in rows if r[1] in _FORMATS and r[2]}
                 counts = self._counts(database)
-        except sqlite3.Error as error:
+        except (sqlite3.Error, UnicodeDecodeError) as error:  # messages quote damaged names
             self._salvaged = salvaged = salvage(path)
             topics, texts, counts = salvaged.topics, salvaged.definitions, dict(salvaged.counts)
             if not topics:
@@ -76,15 +77,20 @@ class SqliteReader:
         self.losses.clear()
         numbers = [number for number, index in self._indices.items() if index in wanted]
         window: list[_Row] = []
-        size = 0
+        size = read = 0
         for rows in self._rows(numbers):
             window += rows
+            read += len(rows)
             size += sum(len(row[3]) for row in rows)
             if size > WINDOW_BYTES:
                 yield self._block(window)
                 window, size = [], 0
         if window:
             yield self._block(window)
+        missing = sum(self.connections[index].count for index in wanted) - read
+        if missing > 0 and not self.losses:
+            what, why = f"{self._path.name}: messages", "rows that hold no message"
+            self.losses.append(Loss(kind="lost", what=what, count=missing, reason=why))
 
     def _rows(self, numbers: list[int]) -> Iterator[list[_Row]]:
         """Messages of some topics, a thousand at a time; by the pages where SQLite gives up."""
@@ -102,7 +108,7 @@ class SqliteReader:
                     while found := cursor.fetchmany(_ROWS):
                         last = found[-1][0]
                         yield found
-            except sqlite3.Error:
+            except (sqlite3.Error, UnicodeDecodeError):
                 salvaged = salvage(self._path)
             else:
                 return
@@ -133,6 +139,7 @@ class SqliteReader:
         if not (log.exists() and log.stat().st_size):
             uri = f"{self._path.resolve().as_uri()}?mode=ro&immutable=1"
             with closing(sqlite3.connect(uri, uri=True)) as database:
+                database.text_factory = _text
                 yield database
             return
         # Its newest messages are in the write-ahead log, which SQLite would fold into the file.
@@ -140,4 +147,27 @@ class SqliteReader:
             for file in (self._path, log):
                 shutil.copy(file, folder)
             with closing(sqlite3.connect(Path(folder) / self._path.name)) as database:
+                database.text_factory = _text
                 yield database
+
+
+def _text(data: bytes) -> str:
+    return data.decode("utf-8", "replace")
+
+
+def _check_size(path: Path) -> None:
+    """Raise sqlite3.DatabaseError where the file is shorter than its header says.
+
+    SQLite takes the pages that are missing for empty ones as long as it may. The header's count of
+    pages holds where it was written with the last change (sqlite.org/fileformat.html, 1.3.7).
+    """
+    with path.open("rb") as stream:
+        head = stream.read(100)
+    if len(head) < 100:
+        raise sqlite3.DatabaseError("the file ends within its header")
+    page, changes, pages, valid_for = (
+        int.from_bytes(head[a:b], "big") for a, b in ((16, 18), (24, 28), (28, 32), (92, 96))
+    )
+    size = (65536 if page == 1 else page) * pages
+    if changes == valid_for and path.stat().st_size < size:
+        raise sqlite3.DatabaseError("the file is cut")
