@@ -32,6 +32,10 @@ class SqliteReader:
         self._salvaged: Salvaged | None = None
         try:
             with self._database() as database:
+                # SQLite reads on over some damage, and gives fewer messages or some twice.
+                (verdict,) = database.execute("PRAGMA quick_check(1)").fetchone()
+                if verdict != "ok":
+                    raise sqlite3.DatabaseError(verdict)
                 tables = {r[0] for r in database.execute("SELECT name FROM sqlite_master")}
                 if not {"topics", "messages"} <= tables:
                     raise LogError("a SQLite file, but not of rosbag2", where=path)
@@ -46,11 +50,14 @@ class SqliteReader:
                     )
                     texts = {r[0]: (r[1], r[2]) for r in rows if r[1] in _FORMATS and r[2]}
                 counts = self._counts(database)
-        except sqlite3.Error as error:
+                if not all(isinstance(text, str) for topic in topics for text in topic[1:]):
+                    raise sqlite3.DatabaseError("a topic without a name")
+        except (sqlite3.Error, UnicodeDecodeError) as error:
             self._salvaged = salvaged = salvage(path)
             topics, texts, counts = salvaged.topics, salvaged.definitions, dict(salvaged.counts)
             if not topics:
                 raise LogError(f"damaged SQLite file: {error}", where=path) from error
+        self._total = sum(counts.values())
         self._indices = {row[0]: index for index, row in enumerate(topics)}
         self.connections = tuple(
             Connection(
@@ -79,18 +86,22 @@ class SqliteReader:
         try:
             with self._database() as database:
                 rows = database.execute(
-                    "SELECT topic_id, timestamp, data FROM messages ORDER BY id"
+                    "SELECT topic_id, timestamp, data FROM messages"
+                    " WHERE typeof(timestamp) = 'integer' AND typeof(data) = 'blob' ORDER BY id"
                 )
                 for number, t_log_ns, data in rows:
-                    read += 1
                     index = self._indices.get(number)
+                    read += index is not None
                     if index is not None and index in wanted:
-                        yield index, int(t_log_ns), bytes(data)
+                        yield index, t_log_ns, data
+            self._lose(self._total - read, "no blob, no time, or its topic is in no row")
         except sqlite3.Error as error:
-            left = max(sum(c.count for c in self.connections) - read, 1)
-            reason = f"damaged SQLite file: {error}"
+            self._lose(max(self._total - read, 1), f"damaged SQLite file: {error}")
+
+    def _lose(self, count: int, reason: str) -> None:
+        if count:
             what = f"{self._path.name}: messages"
-            self.losses.append(Loss(kind="lost", what=what, count=left, reason=reason))
+            self.losses.append(Loss(kind="lost", what=what, count=count, reason=reason))
 
     def _counts(self, database: sqlite3.Connection) -> dict[int, int]:
         rows = database.execute("SELECT topic_id, COUNT(*) FROM messages GROUP BY topic_id")
