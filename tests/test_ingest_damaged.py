@@ -13,6 +13,9 @@ from hypothesis import strategies as st
 from slamreplay.errors import LogError, UsageError
 from slamreplay.ingest.pipeline import ingest
 
+# A damaged number may be as large as numbers get.
+pytestmark = pytest.mark.filterwarnings("default:overflow encountered:RuntimeWarning")
+
 SECOND = 10**9
 EPOCH = 1_700_000_000 * SECOND
 ODOM, SCAN, TF = "nav_msgs/msg/Odometry", "sensor_msgs/msg/LaserScan", "tf2_msgs/msg/TFMessage"
@@ -156,16 +159,16 @@ class Log:
         assert not target.exists()
         return None
 
-    def check(self):
-        """Ingest the damaged log: what is gone is counted."""
+    def check(self, *, twice=False):
+        """Ingest the damaged log: what is gone is counted. Some of it may be there `twice`."""
         bundle = self.ingested()
         if bundle is None:
             return
         rows = rows_of(bundle)
         assert set(rows) <= set(self.rows)
-        assert all(rows[table] <= self.rows[table] for table in rows)
+        assert twice or all(rows[table] <= self.rows[table] for table in rows)
         gone = {table: self.rows[table] - rows.get(table, 0) for table in self.rows}
-        gone = {table: count for table, count in gone.items() if count}
+        gone = {table: count for table, count in gone.items() if count > 0}
         assert bundle.manifest.losses or not gone, f"{gone} rows are gone without a word"
 
 
@@ -239,7 +242,8 @@ def test_a_block_left_out_or_written_twice(log, share, size, times):
     at = int(share * len(log.content))
     content = log.content[:at] + log.content[at : at + size] * times + log.content[at + size :]
     log.file.write_bytes(content)
-    log.check()
+    # Bags and MCAP files do not number their messages: a record that is there twice is two.
+    log.check(twice=times == 2 and log.file.suffix in {".bag", ".mcap"})
 
 
 @fuzz
@@ -264,26 +268,25 @@ def test_damaged_metadata(with_metadata, share, flip, cut):
 
 KEYS = ["relative_file_paths", "compression_format", "compression_mode", "files", "message_count",
         "topics_with_message_count", "storage_identifier", "version"]  # fmt: skip
-values = st.one_of(
-    st.none(), st.booleans(), st.integers(), st.floats(), st.just("zstd"), st.just("message"),
-    st.just("."), st.just("../log"), st.just("/"), st.just("a\0b"), st.just("x" * 5000),
-    st.text(max_size=5), st.lists(st.one_of(st.none(), st.integers(), st.text(max_size=3))),
-    st.just({"a": 1}), st.just([["a"]]), st.just(["metadata.yaml"]), st.just(["."]),
-)  # fmt: skip
+ODD = [None, True, 0, -1, 1.5, "zstd", "message", "file", ".", "../log", "/", "a\0b", "x" * 5000,
+       "", [], [None], [3], [["a"]], ["."], ["metadata.yaml"], ["x" * 5000], ["a\0b"], {}, {"a": 1},
+       [{"a": 1}]]  # fmt: skip
 
 
-@fuzz
-@given(changes=st.dictionaries(st.sampled_from(KEYS), values, min_size=1, max_size=3))
-def test_odd_values_in_metadata(with_metadata, changes):
+def test_odd_values_in_metadata(with_metadata):
     import yaml
 
-    log = with_metadata
-    whole = log.metadata.read_text()
-    meta = yaml.safe_load(whole)
-    meta["rosbag2_bagfile_information"].update(changes)
-    log.metadata.write_text(yaml.safe_dump(meta))
-    log.check()
-    log.metadata.write_text(whole)
+    log, wrong = with_metadata, []
+    meta = yaml.safe_load(log.metadata.read_text())
+    for key in KEYS:
+        for value in ODD:
+            changed = meta["rosbag2_bagfile_information"] | {key: value}
+            log.metadata.write_text(yaml.safe_dump({"rosbag2_bagfile_information": changed}))
+            try:
+                log.check()
+            except Exception as error:  # all of them are to be seen at once
+                wrong.append(f"{key}: {value!r:.30}: {error!r:.60}")
+    assert wrong == []
 
 
 OTHERS = ["", "null", "[]", "3", "a: &a [*a]", "\t", "\0", "!!python/x y", "? {a: b}\n: c",
