@@ -46,8 +46,13 @@ MIXED = [
     30000,
 ]
 PAGE_SIZES = [512, 1024, 2048, 4096, 8192, 16384, 32768, 65536]
+#: The same examples every time, unless a number of random ones is asked for.
+EXAMPLES = int(os.environ.get("SLAMREPLAY_FUZZ", "0"))
 slow = settings(
-    deadline=None, max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture]
+    deadline=None,
+    max_examples=EXAMPLES or 60,
+    derandomize=not EXAMPLES,
+    suppress_health_check=[HealthCheck.function_scoped_fixture],
 )
 
 
@@ -260,7 +265,7 @@ def test_a_file_cut_anywhere_gives_all_messages_before_the_cut(sound, share):
     check_cut(sound, int(len(sound.content) * share))
 
 
-@settings(slow, max_examples=200)
+@settings(slow, max_examples=EXAMPLES or 200)
 @given(data=st.data(), flip=st.integers(1, 255))
 def test_a_damaged_byte_costs_no_more_than_its_page_and_makes_nothing_up(sound, data, flip):
     messages, needs, page_size = sound.messages, sound.needs, sound.page_size

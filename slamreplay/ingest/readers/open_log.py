@@ -66,7 +66,7 @@ def _files(path: Path, losses: list[Loss]) -> list[Path]:
     files = []
     for name in listed:
         places = [path / name, path / Path(name).name, path / f"{name}.zstd"]
-        found = next((p for p in places if p.is_file()), None)
+        found = next((p for p in places if _is_file(p)), None)
         if found is None:
             losses.append(
                 Loss(kind="lost", what=name, count=1, reason="metadata.yaml names it, not there")
@@ -91,6 +91,13 @@ def _files(path: Path, losses: list[Loss]) -> list[Path]:
             hint="give a .bag, .mcap or .db3, or a folder of rosbag2 or MRCLAM",
         )
     return files
+
+
+def _is_file(path: Path) -> bool:
+    try:
+        return path.is_file()
+    except OSError:  # a name that no file can have
+        return False
 
 
 def _metadata(path: Path) -> dict[str, Any]:

@@ -39,6 +39,10 @@ class SqliteReader:
         try:
             _check_size(path)
             with self._database() as database:
+                # SQLite reads on over some damage, and gives fewer messages or some twice.
+                (verdict,) = database.execute("PRAGMA quick_check(1)").fetchone()
+                if verdict != "ok":
+                    raise sqlite3.DatabaseError(verdict)
                 tables = {r[0] for r in database.execute("SELECT name FROM sqlite_master")}
                 if not {"topics", "messages"} <= tables:
                     raise LogError("a SQLite file, but not of rosbag2", where=path)
@@ -53,12 +57,15 @@ class SqliteReader:
                     )
                     texts = {r[0]: (r[1], r[2]) for r in rows if r[1] in _FORMATS and r[2]}
                 counts = self._counts(database)
-        except (sqlite3.Error, UnicodeDecodeError) as error:  # messages quote damaged names
+                if not all(isinstance(text, str) for topic in topics for text in topic[1:]):
+                    raise sqlite3.DatabaseError("a topic without a name")
+        except (sqlite3.Error, UnicodeDecodeError) as error:
             self._salvaged = salvaged = salvage(path)
             topics, texts, counts = salvaged.topics, salvaged.definitions, dict(salvaged.counts)
             if not topics:
                 raise LogError(f"damaged SQLite file: {error}", where=path) from error
         self._indices = {row[0]: index for index, row in enumerate(topics)}
+        self._unnamed = sum(n for number, n in counts.items() if number not in self._indices)
         self.connections = tuple(
             Connection(
                 index,
@@ -88,9 +95,14 @@ class SqliteReader:
         if window:
             yield self._block(window)
         missing = sum(self.connections[index].count for index in wanted) - read
-        if missing > 0 and not self.losses:
-            what, why = f"{self._path.name}: messages", "rows that hold no message"
-            self.losses.append(Loss(kind="lost", what=what, count=missing, reason=why))
+        if self._salvaged is None and not self.losses:  # salvage tells of these itself
+            self._lose(missing, "rows that hold no message")
+            self._lose(self._unnamed, "the row that names their topic is gone")
+
+    def _lose(self, count: int, reason: str) -> None:
+        if count > 0:
+            what = f"{self._path.name}: messages"
+            self.losses.append(Loss(kind="lost", what=what, count=count, reason=reason))
 
     def _rows(self, numbers: list[int]) -> Iterator[list[_Row]]:
         """Messages of some topics, a thousand at a time; by the pages where SQLite gives up."""
