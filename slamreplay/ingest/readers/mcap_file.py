@@ -173,6 +173,8 @@ def _load(stream: BinaryIO, chunk: m.ChunkIndex, table: np.ndarray) -> _Chunk:
     is_index_wrong = bool(chunk.index_length) and block is None
     if block is None:
         block = _by_walking(content, table)
+        if not m.is_sequence(content):
+            return _Chunk(chunk, compact(block), "damaged chunk: its records break off")
     return _Chunk(chunk, compact(block), is_index_wrong=is_index_wrong)
 
 

@@ -75,6 +75,16 @@ def records(data: Bytes, at: int = 0) -> Iterator[tuple[int, int, int]]:
         yield opcode, begin, at
 
 
+def is_sequence(content: Bytes) -> bool:
+    """Whether a chunk's content is records that it may hold, one after another to its end."""
+    last = 0
+    for opcode, _, end in records(content):
+        if opcode not in (SCHEMA, CHANNEL, MESSAGE):
+            return False
+        last = end
+    return last == len(content)
+
+
 def schema(data: Bytes) -> tuple[int, Schema]:
     """Id and schema. Raises ValueError, struct.error where the record is none."""
     (number,) = struct.unpack_from("<H", data)

@@ -90,6 +90,18 @@ def from_summary(path: Path) -> Contents | None:
     return contents
 
 
+def _told(path: Path, size: int) -> dict[int, int]:
+    """Messages by channel as the statistics have them; none where there are no statistics."""
+    summary = _summary(path, size)
+    for opcode, begin, end in m.records(summary):
+        if opcode == m.STATISTICS:
+            try:
+                return m.statistics(summary[begin:end])[2]
+            except (ValueError, struct.error):
+                break
+    return {}
+
+
 def _summary(path: Path, size: int) -> bytes:
     """Records of the summary section; empty where there is none or its checksum differs."""
     with path.open("rb") as stream:
@@ -139,6 +151,8 @@ def from_scan(path: Path, damage: Damage) -> Contents:
             if following is None:
                 break
             at = following
+    for number, count in _told(path, size).items():
+        contents.counts[number] = max(contents.counts[number], count)  # reading tells what lacks
     if not is_closed:
         damage.mend("files", "it has no end: never closed, or cut")
     if contents.twice:
