@@ -14,6 +14,7 @@ class Damage:
 
     def __init__(self, name: str) -> None:
         self._name = name
+        self._kept: list[Loss] = []
         self._found: dict[tuple[str, str], Loss] = {}
         self.last_good_ns: int | None = None
 
@@ -70,11 +71,17 @@ class Damage:
         what = f"{self._name}: {unit}"
         self._found[key] = Loss(kind="repaired", what=what, count=count, reason=reason)
 
+    def keep(self) -> None:
+        """What was found so far is of the file itself, however often it is read."""
+        self._kept = list(self._found.values())
+        self.clear()
+
     def losses(self) -> list[Loss]:
         """All of them, in the order they were found."""
-        return list(self._found.values())
+        last = {"last_good_ns": self.last_good_ns}
+        return [*(loss.model_copy(update=last) for loss in self._kept), *self._found.values()]
 
     def clear(self) -> None:
-        """Forget everything: the file is read again."""
+        """Forget what reading found: the file is read again."""
         self._found.clear()
         self.last_good_ns = None

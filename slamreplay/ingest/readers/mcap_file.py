@@ -51,20 +51,18 @@ class McapReader:
         self.sources = (source,)
         self._path = path
         self._damage = Damage(path.name)
-        found = from_summary(path)
-        self._contents: Contents = found or from_scan(path, self._damage)
-        self._scanned = self._damage.losses()
+        self._contents: Contents = from_summary(path) or from_scan(path, self._damage)
+        self._damage.keep()
         channels = self._contents.channels
         self._indices = {number: index for index, number in enumerate(sorted(channels))}
         self.connections = tuple(self._connection(number) for number in sorted(channels))
-        if not self.connections and self._scanned:
-            raise LogError(self._scanned[0].reason, where=path)
+        if not self.connections and self.losses:
+            raise LogError(self.losses[0].reason, where=path)
 
     @property
     def losses(self) -> list[Loss]:
         """See `Reader`."""
-        last = {"last_good_ns": self._damage.last_good_ns}
-        return [*(s.model_copy(update=last) for s in self._scanned), *self._damage.losses()]
+        return self._damage.losses()
 
     def blocks(self, wanted: Collection[int]) -> Iterator[Block]:
         """See `Reader`."""

@@ -59,20 +59,19 @@ class Ros1Reader:
             )
         self._damage = Damage(path.name)
         self._contents = from_index(path) or from_scan(path, self._damage)
-        self._scanned = self._damage.losses()
+        self._damage.keep()
         counts = self._contents.counts
         self.connections = tuple(
             replace(connection, count=counts[number])
             for number, connection in self._contents.connections.items()
         )
-        if not self.connections and self._scanned:
-            raise LogError(self._scanned[0].reason, where=path)
+        if not self.connections and self.losses:
+            raise LogError(self.losses[0].reason, where=path)
 
     @property
     def losses(self) -> list[Loss]:
         """See `Reader`."""
-        last = {"last_good_ns": self._damage.last_good_ns}
-        return [*(s.model_copy(update=last) for s in self._scanned), *self._damage.losses()]
+        return self._damage.losses()
 
     def blocks(self, wanted: Collection[int]) -> Iterator[Block]:
         """See `Reader`."""
