@@ -7,8 +7,9 @@ from slamreplay.bundle.manifest import Frames
 from slamreplay.bundle.no_return import told_as_range_max
 from slamreplay.bundle.tables import Ragged
 from slamreplay.ingest.lasers import no_returns, second_scan
-from slamreplay.ingest.roles import choose_scan, valid_beams
+from slamreplay.ingest.roles import choose_scan
 from slamreplay.ingest.rows import TopicRows
+from slamreplay.ingest.valid_beams import valid_beams
 
 SCANS = 12
 FRAMES = Frames(map=None, odom="odom", base="base_link", tree=[])

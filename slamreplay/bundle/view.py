@@ -15,6 +15,7 @@ from slamreplay.bundle.arrow import numbers_from_arrow
 from slamreplay.bundle.manifest import Manifest
 from slamreplay.bundle.map_course import Held, MapStretch, map_course, map_stretches
 from slamreplay.bundle.placeholders import without_placeholders
+from slamreplay.bundle.role_tables import ROLE_TABLES
 from slamreplay.bundle.schema import JUDGING_KINDS, SENSED_KINDS, TABLES
 from slamreplay.bundle.store import read_columns, read_grid, read_manifest, read_table
 from slamreplay.bundle.tables import Table
@@ -255,32 +256,6 @@ class BundleView:
     def with_setting(self, name: str, value: float) -> BundleView:
         """A view that asks estimators to run with one setting changed."""
         return replace(self, settings={**self.settings, name: value})
-
-
-#: Which table the topic of a role has its rows in.
-ROLE_TABLES = {
-    "odometry": "odometry",
-    "imu": "imu",
-    "scan": "scans",
-    "scan_2": "scans",
-    "points": "points",
-    "pose": "poses",
-    "covariance": "poses",
-    "initial_pose": "initial_poses",
-    "particles": "particles",
-    "costmap": "costmaps",
-    "plan": "plans",
-    "command": "commands",
-    "velocity": "velocities",
-    "joints": "joints",
-    "magnetic_field": "magnetic_fields",
-    "quality": "signals",
-    "clock": "clock",
-    "closure": "closures",
-    "recovery": "recoveries",
-    "reference": "references",
-    "map": "map_updates",
-}
 
 
 def edges_of(transforms: Table) -> list[Edge]:

@@ -16,7 +16,8 @@ from slamreplay.audit.delays import Delays, delays
 from slamreplay.audit.log_audit import LogAudit, key
 from slamreplay.audit.rates import Rate
 from slamreplay.audit.streams import SENSOR_TABLES, Stream
-from slamreplay.bundle.view import ROLE_TABLES, Bundle
+from slamreplay.bundle.role_tables import ROLE_TABLES
+from slamreplay.bundle.view import Bundle
 from slamreplay.consistency import AUDITS, CHECKS
 from slamreplay.consistency.context import CheckContext
 from slamreplay.consistency.inspection_frames import frames_audit

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 from slamreplay.bundle.manifest import FrameEdge, Frames, Loss
-from slamreplay.bundle.view import ROLE_TABLES
+from slamreplay.bundle.role_tables import ROLE_TABLES
 from slamreplay.errors import UsageError
 from slamreplay.ingest import roles
 from slamreplay.ingest.changes import settle_changes

@@ -18,8 +18,9 @@ from slamreplay.geometry import se3
 from slamreplay.geometry.times import NO_STAMP
 from slamreplay.geometry.transforms import Edge, TransformBuffer
 from slamreplay.ingest.names import tokens
-from slamreplay.ingest.roles import Choice, valid_beams
+from slamreplay.ingest.roles import Choice
 from slamreplay.ingest.rows import TopicRows
+from slamreplay.ingest.valid_beams import valid_beams
 
 #: A range that is told again differs by rounding; independent lasers differ by centimetres.
 _SAME_M = 0.003

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from slamreplay.bundle.manifest import Loss, Source
-from slamreplay.bundle.view import ROLE_TABLES
+from slamreplay.bundle.role_tables import ROLE_TABLES
 from slamreplay.geometry.times import NO_STAMP
 from slamreplay.ingest.cast import Cast
 from slamreplay.ingest.grid_updates import fitting, grid_of

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import yaml
 
-from slamreplay.bundle.view import ROLE_TABLES
+from slamreplay.bundle.role_tables import ROLE_TABLES
 from slamreplay.errors import UsageError
 from slamreplay.ingest.clouds.band import BAND_KEY
 

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from slamreplay.bundle.manifest import Frames
-from slamreplay.bundle.no_return import told_as_range_max
 from slamreplay.bundle.recoveries import NAVIGATIONS, tells_of_every_recovery
 from slamreplay.bundle.schema import JUDGING_KINDS
 from slamreplay.ingest.action_names import action_of, is_recovery, service_of
@@ -22,6 +21,7 @@ from slamreplay.ingest.names import (
     tokens,
 )
 from slamreplay.ingest.rows import TopicRows
+from slamreplay.ingest.valid_beams import valid_beams
 
 #: Where a topic with one of these words stands on the way to a goal, not at the robot.
 _NOT_A_BELIEF = frozenset({"goal", "goals", "target", "waypoint", "waypoints", "dock", "docking",
@@ -288,17 +288,6 @@ def _correction(topics: Sequence[TopicRows], frames: Frames) -> TopicRows | None
             counts[id(topic)] = sum({p, c} == ends for p, c in pairs)
     found = [t for t in topics if counts.get(id(t), 0)]
     return max(found, key=lambda t: (counts[id(t)], t.topic)) if found else None
-
-
-def valid_beams(topic: TopicRows) -> float:
-    """Beams of all scans within their range limits."""
-    ranges = topic.columns["ranges_m"]
-    far = ranges.spread(topic.columns["range_max_m"])
-    near = ranges.spread(topic.columns["range_min_m"])
-    with np.errstate(invalid="ignore"):
-        inside = (ranges.values >= near) & (ranges.values <= far) & (ranges.values > 0)
-    inside &= ~told_as_range_max(ranges.values, far)
-    return float(inside.sum())
 
 
 def has_covariance(topic: TopicRows) -> bool:
