@@ -12,10 +12,10 @@ from slamreplay.bundle.findings import SEVERITIES, Finding
 from slamreplay.bundle.odometry import odometry_track
 from slamreplay.bundle.run import Run
 from slamreplay.bundle.view import Bundle, BundleView
-from slamreplay.consistency import CHECKS
+from slamreplay.consistency.asking import ask
 from slamreplay.consistency.context import CheckContext
 from slamreplay.consistency.credibility import nees_of_belief
-from slamreplay.consistency.references import best_reference, unused_references
+from slamreplay.consistency.references import references_of, unused_references
 from slamreplay.consistency.sensed import sensed_references
 from slamreplay.hindsight.pipeline import hindsight
 from slamreplay.replay.metrics import trial_metrics
@@ -65,13 +65,14 @@ def postmortem(
     belief = recorded_belief(view, belief_times(view))
     judgement = judge(view, belief, found, limits)
     say("checks", 0.95)
-    best = best_reference(bundle, found)
-    reference, kind = (None, None) if best is None else best
-    context = CheckContext(belief, reference, kind, view)
+    references = references_of(bundle, found)
+    context = CheckContext(belief, references, view)
+    best = context.reference
+    reference, kind = (None, None) if best is None else (best.track, best.kind)
     findings = [*judgement.findings, *unused_references(bundle)]
     findings += sensed_references(bundle, found, hold_out)
-    for name in CHECKS:
-        findings += CHECKS.load(name)(context)
+    undisturbed = (run for run in runs if run.trial.perturbation is None)
+    findings += ask([context, *(CheckContext.of_run(run, references, view) for run in undisturbed)])
     track = None if found is None else found.track
     trials = tuple(
         TrialResult(

@@ -42,7 +42,7 @@ def with_manifest(bundle, **parts):
 
 def findings(bundle, *names):
     """What the checks that `inspect` asks say, as (id, severity, message)."""
-    context = CheckContext(None, None, None, bundle.view())
+    context = CheckContext(None, (), bundle.view())
     return [(f.id, f.severity, f.message) for name in (names or AUDITS)
             for f in CHECKS.load(name)(context)]  # fmt: skip
 

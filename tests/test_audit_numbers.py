@@ -136,7 +136,7 @@ def test_findings_count_placeholders_and_say_what_became_of_them(sound):
     })  # fmt: skip
 
     def found(check):
-        return CHECKS.load(check)(CheckContext(None, None, None, odd.view()))
+        return CHECKS.load(check)(CheckContext(None, (), odd.view()))
 
     first, second = found("numbers")
     assert (first.id, first.severity) == ("SR-DAT-003", "info")

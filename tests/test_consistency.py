@@ -5,7 +5,7 @@ import pytest
 from scipy.signal import lfilter
 from scipy.stats import chi2
 
-from slamreplay.bundle.findings import FINDINGS
+from slamreplay.bundle.findings import FINDINGS, Finding
 from slamreplay.bundle.manifest import Clock, Frames, Loss, Manifest, Missing, Role
 from slamreplay.bundle.products import Hindsight
 from slamreplay.bundle.schema import TABLES
@@ -13,13 +13,16 @@ from slamreplay.bundle.tables import Table
 from slamreplay.bundle.track import PoseTrack
 from slamreplay.bundle.view import Bundle
 from slamreplay.consistency import CHECKS
+from slamreplay.consistency.answers import Suspicion, holm, raised
+from slamreplay.consistency.asking import ask
 from slamreplay.consistency.context import CheckContext
 from slamreplay.consistency.credibility import nees_of_belief
 from slamreplay.consistency.effective_samples import autocorrelation_time, effective_samples
+from slamreplay.consistency.evidence import Reference
 from slamreplay.consistency.intervals import mean_interval, mean_p_value
 from slamreplay.consistency.nees import nees
 from slamreplay.consistency.published import fresh_rows, published_belief
-from slamreplay.consistency.references import best_reference, unused_references
+from slamreplay.consistency.references import references_of, unused_references
 from slamreplay.geometry import se2, se3
 from slamreplay.geometry.covariance import ros_from_planar, turned
 
@@ -101,6 +104,30 @@ def test_a_consistent_but_correlated_error_is_not_accused():
 
     assert accused <= 1
     assert naive >= 30  # what the textbook interval would have done
+
+
+@pytest.mark.parametrize("p", [[], [0.01], [0.01, 0.04, 0.03, 0.005], [0.5, 0.5, 1.0, 1e-9, 0.02]])
+def test_holm_is_the_step_down_procedure(p):
+    # By its definition: reject in order of size while p_(k) stays below level / (N - k + 1).
+    adjusted = holm(p)
+    for level in (1e-3, 0.02, 0.05, 0.2, 0.9):
+        rejected, alive = set(), True
+        for k, at in enumerate(np.argsort(p, kind="stable")):
+            alive = alive and p[at] * (len(p) - k) <= level
+            rejected |= {int(at)} if alive else set()
+        assert rejected == set(np.flatnonzero(adjusted <= level))
+
+
+def test_a_suspicion_must_survive_the_number_of_questions():
+    one = Suspicion(Finding("SR-CON-001", "warning", "too small"), 2e-4)
+    others = [Suspicion(Finding("SR-CON-001", "warning", "fine"), 0.5)] * 9
+    fact = Finding("SR-CON-003", "info", "no reference")
+
+    assert [f.message for f in raised([one, fact])] == [
+        "too small (p = 0.0002, 0.0002 after Holm over 1 tests of this log)",
+        "no reference",
+    ]
+    assert raised([one, *others]) == ()  # 10 x 2e-4
 
 
 # --- NEES ------------------------------------------------------------------------------------
@@ -274,8 +301,8 @@ def references(track, kind, topic="/truth"):
 
 def run(name, log, reference, kind="simulation"):
     view = log.view()
-    context = CheckContext(published_belief(view), reference, kind, view)
-    return CHECKS.load(name)(context)
+    known = () if reference is None else (Reference(kind, "/truth", reference),)
+    return tuple(ask([CheckContext(published_belief(view), known, view)], [name]))
 
 
 def test_best_reference_is_taken_by_kind_and_hindsight_last():
@@ -286,9 +313,12 @@ def test_best_reference_is_taken_by_kind_and_hindsight_last():
     )
     hindsight = Hindsight(truth, 0.03, 1.0, np.ones(5), None, None)
 
-    assert best_reference(bundle([both]), hindsight)[1] == "simulation"
-    assert best_reference(bundle([]), hindsight)[1] == "hindsight"
-    assert best_reference(bundle([]), None) is None
+    assert [r.kind for r in references_of(bundle([both]), hindsight)][::2] == [
+        "simulation",
+        "hindsight",
+    ]
+    assert [r.kind for r in references_of(bundle([]), hindsight)] == ["hindsight"]
+    assert references_of(bundle([]), None) == ()
 
 
 def test_reference_in_its_own_frame_is_used_only_by_a_static_transform():
@@ -300,9 +330,9 @@ def test_reference_in_its_own_frame_is_used_only_by_a_static_transform():
     alone = bundle([references(lab, "motion_capture")])
     tied = bundle([references(lab, "motion_capture"), static("map", "lab", offset)])
 
-    assert best_reference(alone, None) is None
+    assert references_of(alone, None) == ()
     assert "lab" in unused_references(alone)[0].message
-    np.testing.assert_allclose(best_reference(tied, None)[0].xyyaw, truth.xyyaw, atol=1e-9)
+    np.testing.assert_allclose(references_of(tied, None)[0].track.xyyaw, truth.xyyaw, atol=1e-9)
 
 
 def test_reference_of_another_frame_of_the_robot_is_carried_to_the_base():
@@ -313,8 +343,8 @@ def test_reference_of_another_frame_of_the_robot_is_carried_to_the_base():
     )
     log = bundle([references(marker, "motion_capture"), static("base", "marker", mount)])
 
-    np.testing.assert_allclose(best_reference(log, None)[0].xyyaw, truth.xyyaw, atol=1e-9)
-    assert best_reference(bundle([references(marker, "motion_capture")]), None) is None
+    np.testing.assert_allclose(references_of(log, None)[0].track.xyyaw, truth.xyyaw, atol=1e-9)
+    assert references_of(bundle([references(marker, "motion_capture")]), None) == ()
 
 
 def test_nees_check_accuses_the_bold_and_leaves_the_honest_alone():
@@ -356,7 +386,9 @@ def test_without_coupling_position_and_heading_are_judged_apart():
     (finding,) = run("nees", log, truth)
 
     assert "heading" in finding.message
-    assert not nees_of_belief(CheckContext(None, truth, "survey", log.view())).has_cross_terms
+    assert not nees_of_belief(
+        CheckContext(None, (Reference("survey", "/truth", truth),), log.view())
+    ).has_cross_terms
 
 
 def test_held_covariances_are_one_update():

@@ -168,7 +168,7 @@ def test_every_key_is_there_and_the_unknown_is_null(post, bare):
     assert full["findings"][2]["title"] == "OTHER-7"
     assert set(full["findings"][0]) == {
         "id", "severity", "title", "message", "start_ns", "end_ns", "value", "low", "high", "unit",
-        "n", "n_eff",
+        "n", "n_eff", "p_value", "p_adjusted",
     }  # fmt: skip
 
 

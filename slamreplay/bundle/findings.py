@@ -23,6 +23,8 @@ class Finding:
         unit: unit of these numbers.
         n: samples.
         n_eff: effective samples, after autocorrelation.
+        p_value: of data at least this odd from a consistent belief; None where nothing was tested.
+        p_adjusted: the same after Holm's correction over all tests of the log.
     """
 
     id: str
@@ -36,6 +38,8 @@ class Finding:
     unit: str = ""
     n: int | None = None
     n_eff: float | None = None
+    p_value: float | None = None
+    p_adjusted: float | None = None
 
     @property
     def title(self) -> str:

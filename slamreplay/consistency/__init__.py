@@ -30,3 +30,6 @@ AUDITS = (
     "numbers",
     "lasers",
 )
+
+#: The checks that concern a belief, whoever holds it: runs of estimators are asked them too.
+ABOUT_BELIEF = frozenset({"nees"})

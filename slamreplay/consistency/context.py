@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from functools import cached_property
+from types import MappingProxyType
 
 from slamreplay.audit.log_audit import LogAudit
+from slamreplay.bundle.run import Innovations, Run
 from slamreplay.bundle.track import PoseTrack
 from slamreplay.bundle.view import BundleView
+from slamreplay.consistency.evidence import Evidence, Reference
+from slamreplay.consistency.gathering import evidence_of, updates_of
+from slamreplay.geometry.se2 import Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -15,17 +21,50 @@ class CheckContext:
     """A belief, what to hold it against, and the evidence it came from.
 
     Attributes:
-        belief: what the robot believed; None where no localizer spoke. Checks of the covariance
-            read the poses table as well, for there it stands as it was published.
-        reference: the best independent idea of the truth, None where the log has none.
-        reference_kind: simulation, motion_capture, survey, gnss, fiducial, dock or hindsight.
+        belief: what the robot, or an estimator, believed; None where no localizer spoke. Checks of
+            the covariance read the poses table as well, for there it stands as it was published.
+        references: independent ideas of the truth, the best first, hindsight last.
         view: the log, without references that only judge.
+        subject: the estimator whose run this is; empty for the robot's own localizer.
+        innovations: what each measurement said against the estimator's prediction, by source.
+        diagnostics: the estimator's further columns, one row per row of the belief.
     """
 
     belief: PoseTrack | None
-    reference: PoseTrack | None
-    reference_kind: str | None
+    references: tuple[Reference, ...]
     view: BundleView
+    subject: str = ""
+    innovations: tuple[Innovations, ...] = ()
+    diagnostics: Mapping[str, Array] = field(default_factory=lambda: MappingProxyType({}))
+
+    @classmethod
+    def of_run(cls, run: Run, references: tuple[Reference, ...], view: BundleView) -> CheckContext:
+        """What a run of an estimator is asked by; one without an estimate has no belief."""
+        if run.estimate is None:
+            return cls(None, references, view, run.trial.estimator)
+        estimate = run.estimate
+        return cls(estimate.track, references, view, run.trial.estimator, estimate.innovations,
+                   estimate.diagnostics)  # fmt: skip
+
+    @property
+    def reference(self) -> Reference | None:
+        """The best one."""
+        return self.references[0] if self.references else None
+
+    @cached_property
+    def updates(self) -> PoseTrack | None:
+        """The rows at which the belief was really updated, None without any covariance.
+
+        A covariance that was merely held between them would count the same evidence again.
+        """
+        return updates_of(self.belief, self.view, self.subject, self.diagnostics)
+
+    @cached_property
+    def evidence(self) -> tuple[Evidence, ...]:
+        """The updates' errors against each source that can tell, the best first."""
+        if self.updates is None:
+            return ()
+        return evidence_of(self.updates, self.references)
 
     @cached_property
     def audit(self) -> LogAudit:

@@ -3,25 +3,20 @@
 from __future__ import annotations
 
 from slamreplay.bundle.findings import Finding, Severity
-from slamreplay.bundle.track import PoseTrack
+from slamreplay.consistency.answers import Answer, Suspicion
 from slamreplay.consistency.context import CheckContext
-from slamreplay.consistency.nees import P_ACCUSE, Nees, NeesSummary, Part, nees
-from slamreplay.consistency.published import fresh_rows, published_belief
+from slamreplay.consistency.evidence import Reference
+from slamreplay.consistency.nees import Nees, NeesSummary, Part, nees
 
 #: Off by this factor the covariance misleads whoever plans with it: an error, not a warning.
 GROSS = 2.0
 
 
 def nees_of_belief(context: CheckContext) -> Nees | None:
-    """NEES of the belief at its own updates against the context's reference; None without either.
-
-    The rows are those the localizer published with a covariance; where no pose topic has one, the
-    rows of the belief at which its covariance changed.
-    """
-    belief = _updates(context)
-    if belief is None or context.reference is None:
+    """NEES of the belief at its own updates against the best reference; None without either."""
+    if context.updates is None or context.reference is None:
         return None
-    return nees(belief, context.reference)
+    return nees(context.updates, context.reference.track)
 
 
 def judged_parts(result: Nees) -> tuple[Part, ...]:
@@ -32,57 +27,48 @@ def judged_parts(result: Nees) -> tuple[Part, ...]:
     return ("joint",) if result.has_cross_terms else ("xy", "yaw")
 
 
-def check(context: CheckContext) -> tuple[Finding, ...]:
+def check(context: CheckContext) -> tuple[Answer, ...]:
     """SR-CON-001 where the covariance is at fault, SR-CON-003 where that cannot be decided."""
-    if context.belief is None and _updates(context) is None:
+    if context.belief is None and context.updates is None:
         return ()  # that there is no belief is said by the verdict
     result = nees_of_belief(context)
-    if result is None:
+    if result is None or context.reference is None:
         lacks = "no reference" if context.reference is None else "no covariance was published"
         return (_undecided(f"the covariance could not be held against an error: {lacks}"),)
     if result.refusal is not None:
         return (_undecided(f"NEES refused: {result.refusal}", result),)
-    parts = judged_parts(result)
-    # Each part takes its share of the error probability, so that the log as a whole keeps it.
-    summaries = [result.summary(part, P_ACCUSE / len(parts)) for part in parts]
-    accused = [s for s in summaries if s.credibility in ("overconfident", "underconfident")]
-    kind = context.reference_kind or "reference"
-    if kind == "hindsight":
-        accused = [
-            s for s in accused if s.credibility == "overconfident" and (s.ratio or 0.0) >= GROSS
-        ]
-    if accused:
-        return tuple(_accusation(result, s, kind) for s in accused)
+    summaries = [result.summary(part) for part in judged_parts(result)]
+    reference = context.reference
     if all(s.credibility == "insufficient" for s in summaries):
         few = max(s.n_eff for s in summaries)
-        text = f"too few independent updates ({few:.0f}) to judge the covariance against {kind}"
-        return (_undecided(f"{text}: {summaries[0].sentence}", result, few),)
-    if kind == "hindsight":
+        text = f"too few independent updates ({few:.0f}) to judge the covariance against "
+        text += f"{reference.kind}: {summaries[0].sentence}"
+        return (_undecided(text, result, few),)
+    answers: list[Answer] = [
+        _suspicion(result, s, reference) for s in summaries if s.credibility != "insufficient"
+    ]
+    accused = [s for s in summaries if s.credibility == "overconfident" and _gross(s)]
+    if reference.shared and not accused:
         text = (
             "no gross over-confidence against hindsight, which shares the robot's scans and "
             f"therefore cannot prove consistency: {summaries[0].sentence}"
         )
-        return (_undecided(text, result, summaries[0].n_eff),)
-    return ()
+        answers.append(_undecided(text, result, summaries[0].n_eff))
+    return tuple(answers)
 
 
-def _updates(context: CheckContext) -> PoseTrack | None:
-    published = published_belief(context.view)
-    if published is not None or context.belief is None:
-        return published
-    fresh = fresh_rows(context.belief)
-    return fresh if len(fresh) else None
+def _gross(summary: NeesSummary) -> bool:
+    return (summary.ratio or 0.0) >= GROSS
 
 
-def _accusation(result: Nees, summary: NeesSummary, kind: str) -> Finding:
-    k = summary.ratio or 0.0
-    severity: Severity = "error" if k >= GROSS else "warning"
+def _suspicion(result: Nees, summary: NeesSummary, reference: Reference) -> Suspicion:
+    severity: Severity = "error" if _gross(summary) else "warning"
     skipped = ", ".join(f"{count} {reason}" for reason, count in result.invalid.items())
     note = f" (left out: {skipped})" if skipped else ""
-    return Finding(
+    finding = Finding(
         "SR-CON-001",
         severity,
-        f"{summary.sentence}, against {kind.replace('_', ' ')}{note}",
+        f"{summary.sentence}, against {reference.kind.replace('_', ' ')}{note}",
         start_ns=int(result.t_ns[0]),
         end_ns=int(result.t_ns[-1]),
         value=summary.mean,
@@ -92,6 +78,9 @@ def _accusation(result: Nees, summary: NeesSummary, kind: str) -> Finding:
         n=summary.n,
         n_eff=summary.n_eff,
     )
+    p = 1.0 if summary.p_value is None else summary.p_value
+    # What shares evidence with the belief can only show that it is far too sure of itself.
+    return Suspicion(finding, 1.0 if reference.shared and not _gross(summary) else p)
 
 
 def _undecided(text: str, result: Nees | None = None, n_eff: float | None = None) -> Finding:

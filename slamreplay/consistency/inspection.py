@@ -18,7 +18,8 @@ from slamreplay.audit.rates import Rate
 from slamreplay.audit.streams import SENSOR_TABLES, Stream
 from slamreplay.bundle.role_tables import ROLE_TABLES
 from slamreplay.bundle.view import Bundle
-from slamreplay.consistency import AUDITS, CHECKS
+from slamreplay.consistency import AUDITS
+from slamreplay.consistency.asking import ask
 from slamreplay.consistency.context import CheckContext
 from slamreplay.consistency.inspection_frames import frames_audit
 from slamreplay.geometry.times import NS_PER_S
@@ -62,9 +63,9 @@ def inspect(bundle: Bundle) -> dict[str, Any]:
 
     Keys beside those of `summary`: clock, frames, lasers, placeholders, findings.
     """
-    context = CheckContext(None, None, None, bundle.view())
+    context = CheckContext(None, (), bundle.view())
     whole = LogAudit(bundle.view(), bundle.table)  # its topics are told, references too
-    found = [finding for name in AUDITS for finding in CHECKS.load(name)(context)]
+    found = ask([context], AUDITS)
     clock = bundle.manifest.clock
     return {
         **summary(bundle),

@@ -88,6 +88,7 @@ class Nees:
     Attributes:
         t_ns: (N,) times.
         error: (N, 3) belief minus reference, m, m, rad; NaN where either is missing.
+        cov: (N, 3, 3) the belief's plus the reference's own, in the same axes.
         joint: (N,) of x y yaw, NaN where invalid.
         xy: (N,) of the position alone.
         yaw: (N,) of the heading alone.
@@ -99,6 +100,7 @@ class Nees:
 
     t_ns: NDArray[np.int64]
     error: se2.Array
+    cov: se2.Array
     joint: se2.Array
     xy: se2.Array
     yaw: se2.Array
@@ -171,7 +173,7 @@ def nees(estimate: PoseTrack, reference: PoseTrack, max_gap_ns: int = MAX_GAP_NS
         left &= ~rows
     cross = estimate.cov[:, :2, 2]
     crossed = bool((np.isfinite(cross) & (cross != 0.0)).any())
-    return Nees(estimate.t_ns, error, **parts, invalid=invalid, has_cross_terms=crossed,
+    return Nees(estimate.t_ns, error, cov, **parts, invalid=invalid, has_cross_terms=crossed,
                 refusal=refusal)  # fmt: skip
 
 

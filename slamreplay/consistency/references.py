@@ -12,6 +12,7 @@ from slamreplay.bundle.schema import SENSED_KINDS
 from slamreplay.bundle.tables import Table
 from slamreplay.bundle.track import PoseTrack
 from slamreplay.bundle.view import Bundle
+from slamreplay.consistency.evidence import Reference
 from slamreplay.geometry import se2, se3
 from slamreplay.geometry.covariance import planar_from_ros, turned
 from slamreplay.geometry.transforms import TransformBuffer, clean_frame
@@ -31,17 +32,15 @@ class Candidate:
     refusal: str | None
 
 
-def best_reference(bundle: Bundle, hindsight: Hindsight | None) -> tuple[PoseTrack, str] | None:
-    """Base in map from the best usable reference, and its kind; None where the log has none.
+def references_of(bundle: Bundle, hindsight: Hindsight | None) -> tuple[Reference, ...]:
+    """Base in map from every usable reference of the log, the best first, hindsight last.
 
     For metrics only: it reads the kinds that estimators and the verdict must not see.
     """
-    usable = [c for c in candidates(bundle) if c.refusal is None]
-    if usable:
-        return usable[0].track, usable[0].kind
+    usable = [Reference(c.kind, c.topic, c.track) for c in candidates(bundle) if c.refusal is None]
     if hindsight is not None and hindsight.track.has_pose.any():
-        return hindsight.track, "hindsight"
-    return None
+        usable.append(Reference("hindsight", "hindsight", hindsight.track))
+    return tuple(usable)
 
 
 def unused_references(bundle: Bundle) -> tuple[Finding, ...]:

@@ -175,6 +175,8 @@ class FindingPart(_Strict):
     unit: Text
     n: Count
     n_eff: Number
+    p_value: Number
+    p_adjusted: Number
 
 
 class TrialPart(_Strict):
