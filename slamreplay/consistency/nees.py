@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from slamreplay.bundle.track import PoseTrack
 from slamreplay.consistency.effective_samples import effective_samples
 from slamreplay.consistency.intervals import mean_interval, mean_p_value
+from slamreplay.consistency.whitening import whitened
 from slamreplay.geometry import se2
-from slamreplay.geometry.covariance import is_positive_definite
 from slamreplay.geometry.transforms import clean_frame
 
 #: An accusation needs a mean this improbable, and at least this many effective samples.
@@ -193,15 +193,6 @@ def _at(reference: PoseTrack, t_ns: NDArray[np.int64], max_gap_ns: int) -> PoseT
 
 
 def _squared(error: se2.Array, cov: se2.Array, index: list[int]) -> se2.Array:
-    """(N,) |L^-1 e|^2 with P = L L': whitened by forward substitution, P is never inverted."""
-    e = error[:, index]
-    P = cov[:, index][:, :, index]
-    out = np.full(len(e), np.nan)
-    sound = np.isfinite(e).all(axis=1) & is_positive_definite(P)
-    L, e = np.linalg.cholesky(P[sound]), e[sound]
-    white = np.zeros_like(e)
-    for i in range(len(index)):
-        known = np.einsum("nj,nj->n", L[:, i, :i], white[:, :i])
-        white[:, i] = (e[:, i] - known) / L[:, i, i]
-    out[sound] = np.sum(white**2, axis=1)
-    return out
+    """(N,) e' P^-1 e of some of the axes, NaN where it has no value."""
+    white = whitened(error[:, index], cov[:, index][:, :, index])
+    return np.asarray(np.sum(white**2, axis=1))
