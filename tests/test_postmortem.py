@@ -42,7 +42,7 @@ def test_nees_is_measured_against_the_logs_own_reference(lost):
     _, post, _ = lost
 
     assert post.reference_kind == "simulation"
-    assert post.nees.summary("joint").mean > 100.0
+    assert post.nees.summary("joint").test.mean > 100.0
     said = [f.message for f in post.findings if f.id.startswith("SR-CON-0")]
     assert any("against simulation" in message for message in said)
 
@@ -76,7 +76,7 @@ def test_poisoned_reference_changes_nothing_but_what_is_measured_against_it(lost
 
     assert other.judgement == post.judgement
     np.testing.assert_array_equal(other.hindsight.track.xyyaw, post.hindsight.track.xyyaw)
-    assert other.nees.summary().mean != post.nees.summary().mean
+    assert other.nees.summary().test.mean != post.nees.summary().test.mean
 
 
 def test_trials_are_measured_beside_each_other():

@@ -6,7 +6,8 @@ from slamreplay.bundle.findings import Finding, Severity
 from slamreplay.consistency.answers import Answer, Suspicion
 from slamreplay.consistency.context import CheckContext
 from slamreplay.consistency.evidence import Reference
-from slamreplay.consistency.nees import Nees, NeesSummary, Part, nees
+from slamreplay.consistency.nees import Nees, Part, nees
+from slamreplay.consistency.nees_summary import NeesSummary
 
 #: Off by this factor the covariance misleads whoever plans with it: an error, not a warning.
 GROSS = 2.0
@@ -40,7 +41,7 @@ def check(context: CheckContext) -> tuple[Answer, ...]:
     summaries = [result.summary(part) for part in judged_parts(result)]
     reference = context.reference
     if all(s.credibility == "insufficient" for s in summaries):
-        few = max(s.n_eff for s in summaries)
+        few = max(s.test.n_eff for s in summaries)
         text = f"too few independent updates ({few:.0f}) to judge the covariance against "
         text += f"{reference.kind}: {summaries[0].sentence}"
         return (_undecided(text, result, few),)
@@ -53,12 +54,12 @@ def check(context: CheckContext) -> tuple[Answer, ...]:
             "no gross over-confidence against hindsight, which shares the robot's scans and "
             f"therefore cannot prove consistency: {summaries[0].sentence}"
         )
-        answers.append(_undecided(text, result, summaries[0].n_eff))
+        answers.append(_undecided(text, result, summaries[0].test.n_eff))
     return tuple(answers)
 
 
 def _gross(summary: NeesSummary) -> bool:
-    return (summary.ratio or 0.0) >= GROSS
+    return (summary.test.ratio or 0.0) >= GROSS
 
 
 def _suspicion(result: Nees, summary: NeesSummary, reference: Reference) -> Suspicion:
@@ -71,14 +72,14 @@ def _suspicion(result: Nees, summary: NeesSummary, reference: Reference) -> Susp
         f"{summary.sentence}, against {reference.kind.replace('_', ' ')}{note}",
         start_ns=int(result.t_ns[0]),
         end_ns=int(result.t_ns[-1]),
-        value=summary.mean,
-        low=summary.low,
-        high=summary.high,
+        value=summary.test.mean,
+        low=summary.test.low,
+        high=summary.test.high,
         unit="1",
-        n=summary.n,
-        n_eff=summary.n_eff,
+        n=summary.test.n,
+        n_eff=summary.test.n_eff,
     )
-    p = 1.0 if summary.p_value is None else summary.p_value
+    p = 1.0 if summary.test.p_value is None else summary.test.p_value
     # What shares evidence with the belief can only show that it is far too sure of itself.
     return Suspicion(finding, 1.0 if reference.shared and not _gross(summary) else p)
 

@@ -7,7 +7,6 @@ aligned first: an alignment would eat the error that is to be judged.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
@@ -16,14 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slamreplay.bundle.track import PoseTrack
-from slamreplay.consistency.effective_samples import effective_samples
-from slamreplay.consistency.intervals import mean_interval, mean_p_value
+from slamreplay.consistency.mean_test import mean_test
+from slamreplay.consistency.nees_summary import NeesSummary
 from slamreplay.consistency.whitening import whitened
 from slamreplay.geometry import se2
 from slamreplay.geometry.transforms import clean_frame
-
-#: An accusation needs a mean this improbable, and at least this many effective samples.
-P_ACCUSE, N_EFF_MIN = 1e-3, 20.0
 
 #: A reference is interpolated between samples no farther apart than this.
 MAX_GAP_NS = 500_000_000
@@ -31,54 +27,7 @@ MAX_GAP_NS = 500_000_000
 Part = Literal["joint", "xy", "yaw"]
 PARTS: dict[Part, tuple[int, ...]] = {"joint": (0, 1, 2), "xy": (0, 1), "yaw": (2,)}
 
-Credibility = Literal["consistent", "overconfident", "underconfident", "insufficient"]
-
-
-@dataclass(frozen=True)
-class NeesSummary:
-    """The mean of one part's NEES, and what it says.
-
-    Attributes:
-        part: joint (x y yaw), xy or yaw.
-        dof: degrees of freedom: what the mean of a consistent belief would be.
-        n: valid rows.
-        n_eff: effective samples among them.
-        mean: average NEES; None without a valid row.
-        low: lower end of the interval a consistent belief's mean misses with `P_ACCUSE` only.
-        high: upper end.
-        p_value: two-sided.
-        ratio: k = sqrt(mean / dof): sigma is too small by this factor (too large below 1).
-        credibility: insufficient below `N_EFF_MIN` effective samples: no accusation then.
-    """
-
-    part: Part
-    dof: int
-    n: int
-    n_eff: float
-    mean: float | None
-    low: float | None
-    high: float | None
-    p_value: float | None
-    ratio: float | None
-    credibility: Credibility
-
-    @property
-    def sentence(self) -> str:
-        """What a user acts on."""
-        name = {"joint": "the pose", "xy": "the position", "yaw": "the heading"}[self.part]
-        if self.mean is None or self.ratio is None:
-            return f"the sigma of {name} could not be judged: no row was valid"
-        too = "small" if self.ratio >= 1.0 else "large"
-        factor = self.ratio if self.ratio >= 1.0 else 1.0 / max(self.ratio, 1e-9)
-        text = f"the sigma of {name} is too {too} by a factor of {factor:.2g}"
-        if self.credibility == "consistent":
-            text = f"the sigma of {name} fits its error (factor {self.ratio:.2g})"
-        if self.credibility == "insufficient":
-            text = f"undecided whether {text}"
-        numbers = f"mean NEES {self.mean:.3g} where {self.dof} is expected"
-        if self.low is not None and self.high is not None:
-            numbers += f" and {self.low:.3g} to {self.high:.3g} would be chance"
-        return f"{text}: {numbers}; {self.n} updates are worth {self.n_eff:.0f} independent ones"
+NAMES: dict[Part, str] = {"joint": "the pose", "xy": "the position", "yaw": "the heading"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,23 +61,11 @@ class Nees:
         """(N,) NEES of one part."""
         return {"joint": self.joint, "xy": self.xy, "yaw": self.yaw}[part]
 
-    def summary(self, part: Part = "joint", p: float = P_ACCUSE) -> NeesSummary:
-        """The mean of one part against its interval, missed by a consistent belief with `p`."""
-        values, dof = self.values(part), len(PARTS[part])
-        values = values[np.isfinite(values)]
-        n_eff = effective_samples(values)
-        if not len(values):
-            return NeesSummary(part, dof, 0, 0.0, None, None, None, None, None, "insufficient")
-        mean = float(values.mean())
-        low, high = mean_interval(dof, n_eff, p)
-        p_value = mean_p_value(dof, n_eff, mean)
-        verdict: Credibility = "consistent"
-        if n_eff < N_EFF_MIN:
-            verdict = "insufficient"
-        elif p_value < p:
-            verdict = "overconfident" if mean > dof else "underconfident"
-        k = math.sqrt(mean / dof)
-        return NeesSummary(part, dof, len(values), n_eff, mean, low, high, p_value, k, verdict)
+    def summary(self, part: Part = "joint") -> NeesSummary:
+        """The mean of one part against its interval."""
+        index = np.array(PARTS[part])
+        white = whitened(self.error[:, index], self.cov[:, index[:, None], index])
+        return NeesSummary(NAMES[part], mean_test(white))
 
 
 def nees(estimate: PoseTrack, reference: PoseTrack, max_gap_ns: int = MAX_GAP_NS) -> Nees:

@@ -43,7 +43,7 @@ def run_metrics(
             metrics["hindsight_max_rad"] = float(turn.max())
             metrics["lost_share"] = float(off.mean())
     if reference is not None:
-        summary = nees(track, reference).summary("joint")
+        summary = nees(track, reference).summary("joint").test
         if summary.n:
             metrics["nees_mean"], metrics["nees_n_eff"] = summary.mean, summary.n_eff
     return metrics
