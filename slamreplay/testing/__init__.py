@@ -1,5 +1,7 @@
 """The public conformance kit, and a small synthetic bundle for tests of any stage."""
 
+from slamreplay.testing.beliefs import believed
+from slamreplay.testing.checks import check_check
 from slamreplay.testing.conformance import ConformanceError
 from slamreplay.testing.decoders import check_decoder
 from slamreplay.testing.estimators import check_estimator
@@ -8,6 +10,8 @@ from slamreplay.testing.synthetic import synthetic_bundle
 
 __all__ = [
     "ConformanceError",
+    "believed",
+    "check_check",
     "check_decoder",
     "check_estimator",
     "check_perturbation",

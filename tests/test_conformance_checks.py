@@ -1,0 +1,55 @@
+"""Every check before the conformance kit: sound logs are left alone, the named defect is found."""
+
+from functools import partial
+
+import pytest
+from audited import healthy
+
+from slamreplay.bundle.findings import Finding
+from slamreplay.consistency import ABOUT_BELIEF, AUDITS, CHECKS
+from slamreplay.consistency.asking import ask
+from slamreplay.consistency.context import CheckContext
+from slamreplay.testing import ConformanceError, believed, check_check
+
+#: Of each check about a belief: the finding that names its defect, and a log that has it.
+BELIEF_LINES = {
+    "nees": ("SR-CON-001", partial(believed, rows=3000, told=0.5)),
+}
+
+
+@pytest.mark.parametrize("name", BELIEF_LINES)
+def test_belief_check(name):
+    id_, defective = BELIEF_LINES[name]
+    check_check(CHECKS.load(name), id_, defective)
+
+
+def test_every_check_about_a_belief_has_its_line():
+    assert set(BELIEF_LINES) == ABOUT_BELIEF
+
+
+def test_all_checks_together_leave_sound_beliefs_alone():
+    found = [f for seed in range(200) for f in ask([believed(seed)]) if f.severity != "info"]
+
+    assert len(found) <= 2, found
+
+
+def test_audits_leave_sound_logs_alone():
+    # What each of them finds is held in tests/test_audit_*.py, defect by defect.
+    found = []
+    for seed in range(200):
+        view = healthy(seconds=20.0, seed=seed).view()
+        found += [f for f in ask([CheckContext(None, (), view)], AUDITS) if f.severity != "info"]
+
+    assert len(found) <= 2, found
+
+
+def test_the_kit_notices_a_check_that_cries_wolf_and_one_that_is_blind():
+    def wolf(context):
+        return (Finding("SR-CON-001", "warning", "wolf"),)
+
+    with pytest.raises(ConformanceError, match="sound logs"):
+        check_check(wolf, "SR-CON-001", believed, seeds=5)
+    with pytest.raises(ConformanceError, match="0 of 20"):
+        check_check(lambda context: (), "SR-CON-001", believed, seeds=5)
+    with pytest.raises(ConformanceError, match="something else"):
+        check_check(lambda context: ("odd",), "SR-CON-001", believed, seeds=5)
