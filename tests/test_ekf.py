@@ -168,10 +168,10 @@ def test_one_long_log_is_consistent_and_half_the_noise_told_is_four_times_too_su
 
     (plain, nis), (sure, sure_nis) = summary(1.0, 1.0), summary(0.25, 0.25)
     assert plain.credibility == "consistent"
-    assert plain.n_eff > 50
+    assert plain.test.n_eff > 50
     assert nis == pytest.approx(2.0, rel=0.05)
     assert sure.credibility == "overconfident"
-    assert sure.mean / plain.mean == pytest.approx(4.0, rel=0.1)
+    assert sure.test.mean / plain.test.mean == pytest.approx(4.0, rel=0.1)
     assert sure_nis / nis == pytest.approx(4.0, rel=0.02)
 
 
