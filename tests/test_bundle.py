@@ -1,5 +1,7 @@
 """A bundle written and read back is the same bundle, and a damaged one is refused."""
 
+import io
+import json
 import os
 
 import numpy as np
@@ -112,11 +114,16 @@ def test_log_times_are_carried_over_between_knots():
 def test_run_reads_back_what_was_written(tmp_path):
     track = PoseTrack.without_covariance("map", "base", np.arange(4), np.ones((4, 3)))
     innovations = Innovations(
-        "scans", np.arange(2), np.zeros((2, 1)), np.ones((2, 1, 1)), np.array([True, False])
+        "scans",
+        np.arange(2),
+        np.zeros((2, 1)),
+        np.ones((2, 1, 1)),
+        np.array([True, False]),
+        ("range m",),
     )
     run = Run(
         Trial("id", "amcl", 7, "tf_delay.all", 0.2, "s"),
-        Estimate(track, (innovations,), {"particles": np.arange(4.0)}),
+        Estimate(track, (innovations,), {"particles": np.arange(4.0)}, {"recoveries": 2.0}),
     )
     (tmp_path / "r.npz").write_bytes(run_bytes(run))
 
@@ -125,6 +132,24 @@ def test_run_reads_back_what_was_written(tmp_path):
     assert back.trial == run.trial
     assert run_bytes(back) == run_bytes(run)
     assert back.estimate.diagnostics["particles"].tolist() == [0, 1, 2, 3]
+    assert back.estimate.innovations[0].axes == ("range m",)
+    assert back.estimate.scalars == {"recoveries": 2.0}
+
+
+def test_a_run_without_axes_and_scalars_still_reads(tmp_path):
+    track = PoseTrack.without_covariance("map", "base", np.arange(1), np.ones((1, 3)))
+    one = Innovations("s", np.arange(1), np.zeros((1, 1)), np.ones((1, 1, 1)), np.ones(1, bool))
+    run = Run(Trial("id", "amcl", 7), Estimate(track, (one,)))
+    with np.load(io.BytesIO(run_bytes(run))) as arrays:
+        older = dict(arrays)
+    head = json.loads(older["head"].tobytes())
+    del head["axes"], head["scalars"]
+    older["head"] = np.frombuffer(json.dumps(head).encode(), dtype=np.uint8)
+    np.savez(tmp_path / "r.npz", **older)
+
+    back = read_run(tmp_path / "r.npz").estimate
+    assert back.innovations[0].axes == ()
+    assert dict(back.scalars) == {}
 
 
 def test_ragged_take_repeats_and_reorders():

@@ -14,6 +14,7 @@ from slamreplay.testing.decoders import check_payload
 ESTIMATOR_LINES = {
     "amcl": (0.25, 0.15),
     "dead_reckoning": (1e-6, 1e-6),
+    "ekf": (1e-6, 1e-6),
 }
 
 PERTURBATION_LINES = (

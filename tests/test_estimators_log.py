@@ -15,6 +15,7 @@ from slamreplay.geometry import se2
 from slamreplay.testing.synthetic import START_NS, synthetic_bundle, true_path
 
 BUNDLE = synthetic_bundle(seconds=30.0)
+TAGGED = synthetic_bundle(seconds=12.0, with_tags=True)
 NO_START = synthetic_bundle(seconds=12.0, with_belief=False, with_initial_pose=False)
 
 
@@ -96,8 +97,8 @@ def test_a_later_initial_pose_starts_amcl_again():
 
 @pytest.mark.parametrize("name", list(ESTIMATORS))
 def test_settings_shift_the_start(name):
-    plain = first_start(BUNDLE.view())
-    view = BUNDLE.view().with_setting(OFFSET, 1.0).with_setting(ROTATE, 0.5)
+    plain = first_start(TAGGED.view())
+    view = TAGGED.view().with_setting(OFFSET, 1.0).with_setting(ROTATE, 0.5)
 
     moved = se2.between(plain.xyyaw, first_start(view).xyyaw)
     run = ESTIMATORS.load(name)().run(view, seed=1)

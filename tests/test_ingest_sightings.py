@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from slamreplay.bundle.sightings import _covariance
+from slamreplay.bundle.sightings import _stated, _with_usual
 from slamreplay.geometry.geodesy import earth_from_geodetic
 from slamreplay.ingest.pipeline import ingest
 from slamreplay.ingest.sightings import is_tag_frame
@@ -176,4 +176,8 @@ def test_a_sighting_without_bounds_has_the_usual_covariance():
     none, endless = np.full((1, 36), np.nan), np.diag([np.inf] * 6).reshape(1, 36)
     turn, xy = np.array([[[0.6, -0.8, 0.0], [0.8, 0.6, 0.0], [0.0, 0.0, 1.0]]]), np.ones((1, 2))
 
-    np.testing.assert_array_equal(_covariance(endless, turn, xy), _covariance(none, turn, xy))
+    stated = [_stated(covariance, turn) for covariance in (none, endless)]
+
+    np.testing.assert_array_equal(stated, np.nan)
+    np.testing.assert_array_equal(_with_usual(stated[0], xy), _with_usual(stated[1], xy))
+    assert np.isfinite(_with_usual(stated[0], xy)).all()

@@ -55,6 +55,7 @@ class Innovations:
         residual: (N, m) measured minus predicted.
         S: (N, m, m) covariance predicted for it, from the prior.
         accepted: (N,) whether the update used it.
+        axes: m names of what was measured, with their units: "range m"; empty where not told.
     """
 
     source: str
@@ -62,6 +63,7 @@ class Innovations:
     residual: Array
     S: Array
     accepted: NDArray[np.bool_]
+    axes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,11 +74,13 @@ class Estimate:
         track: belief, one row per scan in processing order (odometry rows where no scan is).
         innovations: by source, where the estimator has them.
         diagnostics: further columns (N,) by name: particles, effective sample size, updates.
+        scalars: further numbers of the whole run by name: what was counted or fitted.
     """
 
     track: PoseTrack
     innovations: tuple[Innovations, ...] = ()
     diagnostics: Mapping[str, Array] = field(default_factory=dict)
+    scalars: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,6 +105,8 @@ def run_bytes(run: Run) -> bytes:
         head["frames"] = [track.frame_id, track.child_frame_id]
         arrays |= {"t_ns": track.t_ns, "xyyaw": track.xyyaw, "cov": track.cov}
         head["innovations"] = [i.source for i in run.estimate.innovations]
+        head["axes"] = [i.axes for i in run.estimate.innovations]
+        head["scalars"] = dict(run.estimate.scalars)
         for k, i in enumerate(run.estimate.innovations):
             arrays |= {f"innovation{k}.{n}": getattr(i, n) for n in _INNOVATION}
         arrays |= {f"diagnostic.{k}": v for k, v in sorted(run.estimate.diagnostics.items())}
@@ -127,8 +133,13 @@ def read_run(path: Path) -> Run:
                 return Run(trial, None, head["not_applicable"])
             frame, child = head["frames"]
             track = PoseTrack(frame, child, arrays["t_ns"], arrays["xyyaw"], arrays["cov"])
+            axes = head.get("axes", [[]] * len(head["innovations"]))  # older runs have none
             innovations = tuple(
-                Innovations(source, *(arrays[f"innovation{k}.{n}"] for n in _INNOVATION))
+                Innovations(
+                    source,
+                    **{n: arrays[f"innovation{k}.{n}"] for n in _INNOVATION},
+                    axes=tuple(axes[k]),
+                )
                 for k, source in enumerate(head["innovations"])
             )
             diagnostics = {
@@ -136,9 +147,11 @@ def read_run(path: Path) -> Run:
                 for name in arrays.files
                 if name.startswith("diagnostic.")
             }
-    except (OSError, ValueError, KeyError, TypeError) as error:
+            scalars = {str(k): float(v) for k, v in head.get("scalars", {}).items()}
+    except (OSError, ValueError, LookupError, TypeError, AttributeError) as error:
         raise BundleError("not a readable run", where=path) from error
-    return Run(trial, Estimate(track, innovations, diagnostics), head["not_applicable"])
+    estimate = Estimate(track, innovations, diagnostics, scalars)
+    return Run(trial, estimate, head["not_applicable"])
 
 
 _INNOVATION = ("t_ns", "residual", "S", "accepted")

@@ -37,6 +37,8 @@ class Sightings:
         xyyaw: (N, 3) the thing in the robot's base, m, m, rad; the heading is that of its most
             level axis, NaN where the sensor does not tell it.
         cov: (N, 3, 3) in the base's axes, m^2 and rad^2.
+        stated: (N, 3, 3) what the log itself states of it, NaN where it does not; the heading
+            stands apart from the place.
         surveyed: poses (3,) in the map of the things whose place the log itself states; a heading
             that is never sensed is NaN here too.
     """
@@ -46,6 +48,7 @@ class Sightings:
     name: NDArray[np.object_]
     xyyaw: se2.Array
     cov: se2.Array
+    stated: se2.Array
     surveyed: Mapping[str, se2.Array]
 
     def __len__(self) -> int:
@@ -84,7 +87,8 @@ def sightings_of(view: BundleView, motion: PoseTrack) -> Sightings | None:
     T = T_base_frame[known] @ T_frame_thing[known]
     surveys = _surveys(view.transforms, map_frame, table.take(known), names[known])
     yaw, surveyed = _headings(T, names[known], surveys)
-    cov = _covariance(table["covariance"][known], T_base_frame[known, :3, :3], T[:, :2, 3])
+    stated = _stated(table["covariance"][known], T_base_frame[known, :3, :3])
+    cov = _with_usual(stated, T[:, :2, 3])
     cov[np.isnan(yaw), 2, 2] = _ANY_HEADING
     return Sightings(
         table.t_ns[known],
@@ -92,6 +96,7 @@ def sightings_of(view: BundleView, motion: PoseTrack) -> Sightings | None:
         names[known],
         np.column_stack([T[:, :2, 3], yaw]),
         cov,
+        stated,
         surveyed,
     )
 
@@ -158,19 +163,26 @@ def _headings(
     return yaw, planar
 
 
-def _covariance(covariance: se2.Array, R: se2.Array, xy: se2.Array) -> se2.Array:
-    """(N, 3, 3) in axes of the base: the message's where it is one, never below what is usual."""
-    usual = _NEAR_M + _PER_M * np.hypot(xy[:, 0], xy[:, 1])
-    out = np.zeros((len(xy), 3, 3))
-    out[:, 0, 0] = out[:, 1, 1] = usual**2
-    out[:, 2, 2] = _YAW**2
+def _with_usual(stated: se2.Array, xy: se2.Array) -> se2.Array:
+    """(N, 3, 3) what is stated beside what detectors usually have, which no message makes less."""
+    out = np.where(np.isfinite(stated), stated, 0.0)
+    usual = (_NEAR_M + _PER_M * np.hypot(xy[:, 0], xy[:, 1])) ** 2
+    out[:, 0, 0] += usual
+    out[:, 1, 1] += usual
+    out[:, 2, 2] += _YAW**2
+    return out
+
+
+def _stated(covariance: se2.Array, R: se2.Array) -> se2.Array:
+    """(N, 3, 3) the messages' covariances in axes of the base, NaN where they are none."""
+    out = np.full((len(R), 3, 3), np.nan)
     # An infinite variance says no more than none at all, and products of it would warn.
     full = np.where(np.isfinite(covariance), covariance, np.nan).reshape(-1, 6, 6)
     position = (R @ full[:, :3, :3] @ np.swapaxes(R, 1, 2))[:, :2, :2]
     turn = (R @ full[:, 3:, 3:] @ np.swapaxes(R, 1, 2))[:, 2, 2]
     told: NDArray[np.bool_] = np.asarray(np.isfinite(position).all(axis=(1, 2)))
     told[told] = np.linalg.eigvalsh(position[told])[:, 0] > 0.0
-    out[told, :2, :2] += position[told]
+    out[told, :2, :2] = position[told]
     told = np.isfinite(turn) & (turn > 0.0)  # a reflector has a place and no heading
-    out[told, 2, 2] += turn[told]
+    out[told, 2, 2] = turn[told]
     return out

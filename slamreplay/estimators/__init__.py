@@ -7,5 +7,6 @@ ESTIMATORS = Registry(
     {
         "amcl": "slamreplay.estimators.amcl.estimator:Amcl",
         "dead_reckoning": "slamreplay.estimators.dead_reckoning:DeadReckoning",
+        "ekf": "slamreplay.estimators.ekf.estimator:Ekf",
     },
 )

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from slamreplay.bundle.manifest import MapVersion
 from slamreplay.bundle.map_course import map_course
 from slamreplay.bundle.schema import JUDGING_KINDS, TABLES
+from slamreplay.bundle.sightings import KINDS as SIGHTED_KINDS
 from slamreplay.bundle.tables import Ragged, Table
 from slamreplay.bundle.view import Bundle, BundleView
 from slamreplay.geometry import se2, se3
@@ -100,11 +101,15 @@ def cut(bundle: Bundle, after_ns: int) -> Bundle:
 
 
 def without(bundle: Bundle, part: str) -> Bundle:
-    """The bundle without its scans, odometry (on tf too) or map."""
+    """The bundle without its scans, odometry (on tf too), sightings or map."""
     if part == "map":
         return rebuilt(bundle, {}, None)
     if part == "scans":
         return rebuilt(bundle, {"scans": Table.empty(TABLES["scans"])})
+    if part == "sightings":
+        references = bundle.table("references")
+        sensed = np.isin(references["kind"].astype(str), SIGHTED_KINDS)
+        return rebuilt(bundle, {"references": references.take(~sensed)})
     transforms = bundle.table("transforms")
     keep = transforms["child_frame"] != bundle.manifest.frames.base
     tables = {"transforms": transforms.take(keep)}
@@ -141,8 +146,7 @@ def moved(bundle: Bundle, T_new_map: ArrayLike) -> Bundle:
     """
     T = np.asarray(T_new_map, dtype=np.float64)
     frames = bundle.manifest.frames
-    tables = {name: _moved_poses(bundle.table(name), T) for name in _POSED}
-    tables["references"] = _moved_poses(bundle.table("references"), T)
+    tables = {name: _moved_poses(bundle.table(name), T, frames.map or "map") for name in _POSED}
     transforms = bundle.table("transforms")
     rows = np.flatnonzero(transforms["parent_frame"] == (frames.map or "map"))
     translation = transforms["translation_xyz"].copy()
@@ -165,13 +169,16 @@ def poisoned(bundle: Bundle) -> Bundle:
     return rebuilt(bundle, {"references": table.replace(position_xyz=position)})
 
 
-def _moved_poses(table: Table, T: se2.Array) -> Table:
-    position, orientation = _moved(table["position_xyz"], table["orientation_xyzw"], T)
+def _moved_poses(table: Table, T: se2.Array, map_frame: str) -> Table:
+    rows = np.flatnonzero(table["frame_id"] == map_frame)
+    position, orientation = table["position_xyz"].copy(), table["orientation_xyzw"].copy()
+    covariance = table["covariance"].copy()
+    position[rows], orientation[rows] = _moved(position[rows], orientation[rows], T)
     turn = np.eye(6)
     turn[:2, :2] = turn[3:5, 3:5] = se3.from_planar(T)[:2, :2]
-    cov = table["covariance"].reshape(-1, 6, 6)
-    turned = (turn @ cov @ turn.T).reshape(-1, 36)
-    return table.replace(position_xyz=position, orientation_xyzw=orientation, covariance=turned)
+    cov = covariance[rows].reshape(-1, 6, 6)
+    covariance[rows] = (turn @ cov @ turn.T).reshape(-1, 36)
+    return table.replace(position_xyz=position, orientation_xyzw=orientation, covariance=covariance)
 
 
 def _moved(

@@ -21,7 +21,9 @@ from slamreplay.testing import edits
 from slamreplay.testing.conformance import demand, demand_frozen_dataclass, untouched_global_rng
 from slamreplay.testing.synthetic import synthetic_bundle
 
-PARTS = ("odometry", "scans", "map")
+PARTS = ("odometry", "scans", "map", "sightings")
+#: What settings are changed to: the baseline of no offset (0), switch (0) or ratio (1).
+CHANGED = 2.0
 #: How the world is moved: nothing in it is round, straight or central.
 ELSEWHERE = np.array([31.7, -12.3, 2.2])
 
@@ -38,14 +40,14 @@ def check_estimator(
 
     Args:
         estimator: with `name`, `needs`, `settings` and `run(view, *, seed)`.
-        bundle: evidence with scans, odometry on tf, a map, an initial pose and references, of at
-            least 6 s; by default a robot in a small synthetic room.
+        bundle: evidence with scans, odometry on tf, a map, an initial pose, sightings of surveyed
+            tags and references, of at least 6 s; by default a robot in a small synthetic room.
         seed: for every run.
         tolerance_m: by how much (median over rows) poses may fail to follow the map frame when it
             is moved. For sampling methods: their noise.
         tolerance_rad: the same for headings.
     """
-    bundle = synthetic_bundle(seconds=8.0) if bundle is None else bundle
+    bundle = synthetic_bundle(seconds=8.0, with_tags=True) if bundle is None else bundle
     demand_frozen_dataclass(estimator)
     for attribute in ("needs", "settings"):
         demand(
@@ -167,7 +169,7 @@ def _settings_are_honoured(
     estimator: Any, bundle: Bundle, baseline: Estimate, run: _Runner
 ) -> None:
     for name in sorted(estimator.settings):
-        changed = run(bundle.view().with_setting(name, 1.0))
+        changed = run(bundle.view().with_setting(name, CHANGED))
         demand(
             estimate_bytes(changed) != estimate_bytes(baseline),
             f"{estimator.name} declares the setting '{name}' and does not honour it",

@@ -25,6 +25,12 @@ LATENCY_NS = 5_000_000
 #: The laser on the robot; neither straight nor central, so that a forgotten mount shows.
 MOUNT_XYYAW = np.array([0.15, 0.02, 0.05])
 RANGE_MAX_M = 10.0
+#: Tags x, y, yaw in the frame of the room; the last two are reflectors: points without heading.
+TAGS_XYYAW = np.array(
+    [[0.2, 4.0, 0.0], [6.0, 8.6, -1.6], [11.7, 5.5, 3.0], [5.0, 0.3, 1.5], [9.0, 8.7, np.nan],
+     [0.3, 6.5, np.nan]]
+)  # fmt: skip
+_SEEN_M, _SEEN_RAD = 7.0, 1.0
 _BEAMS = 181
 _SPEED_M_S = 0.5
 
@@ -62,6 +68,7 @@ def synthetic_bundle(
     with_belief: bool = True,
     belief_offset_xyyaw: Sequence[float] = (0.0, 0.0, 0.0),
     offset_from_s: float = 0.0,
+    with_tags: bool = False,
 ) -> Bundle:
     """A bundle in memory, with scans, odometry, tf, map, belief, initial pose and reference.
 
@@ -75,9 +82,10 @@ def synthetic_bundle(
         with_belief: whether a localizer's pose and map->odom were recorded.
         belief_offset_xyyaw: how far that belief is from the truth (in the robot's frame),
         offset_from_s: from then on, in seconds after the start.
+        with_tags: whether the robot sees tags that static transforms tie to the map, at 4 Hz.
     """
     rng = np.random.Generator(np.random.PCG64(seed))
-    options = (seconds, seed, with_map, with_initial_pose, with_belief)
+    options = (seconds, seed, with_map, with_initial_pose, with_belief, with_tags)
     offset = tuple(float(v) for v in belief_offset_xyyaw)
     seen = room_grid() if world is None else world
     identity = repr((*options, offset, offset_from_s, seen.version))
@@ -107,6 +115,12 @@ def synthetic_bundle(
     if with_initial_pose:
         start = se2.compose(true_path(np.zeros(1)), np.array([0.1, -0.1, 0.05]))
         tables["initial_poses"] = _poses("initial_poses", "/initialpose", np.zeros(1), start, 0.05)
+    if with_tags:
+        tags = _sightings(np.arange(0.0, seconds, 0.25), seed)
+        tables["references"] = Table.concat(TABLES["references"], [tables["references"], tags])
+        for k, place in enumerate(se2.compose(room_grid().origin_xyyaw, np.nan_to_num(TAGS_XYYAW))):
+            tag = _tf("map", f"tag_{k}", np.zeros(1), place[None], is_static=True)
+            transforms.append(tag)
     tables["transforms"] = Table.concat(TABLES["transforms"], transforms)
     grids = {room_grid().version: room_grid()} if with_map else {}
     manifest = _manifest(tables, identity, seconds, with_map, with_belief)
@@ -194,6 +208,30 @@ def _scans(t_s: NDArray[np.float64], world: OccupancyGrid, rng: np.random.Genera
         range_min_m=0.05,
         range_max_m=RANGE_MAX_M,
         ranges_m=list(ranges),
+    )
+
+
+def _sightings(t_s: NDArray[np.float64], seed: int) -> Table:
+    """What a camera in the base's origin sees of the tags: 2 cm, 0.01 rad, headings 0.03 rad."""
+    rng = np.random.Generator(np.random.PCG64([seed, 1]))  # leaves all other noise as it is
+    there = se2.compose(room_grid().origin_xyyaw, TAGS_XYYAW)
+    seen = se2.between(true_path(t_s)[:, None], there[None])
+    reach, bearing = np.hypot(seen[..., 0], seen[..., 1]), np.arctan2(seen[..., 1], seen[..., 0])
+    row, tag = np.nonzero((reach < _SEEN_M) & (np.abs(bearing) < _SEEN_RAD))
+    noise = rng.normal(0.0, [0.02, 0.01, 0.03], (len(row), 3))
+    reach, bearing = reach[row, tag] + noise[:, 0], bearing[row, tag] + noise[:, 1]
+    xyyaw = np.column_stack(
+        [reach * np.cos(bearing), reach * np.sin(bearing), seen[row, tag, 2] + noise[:, 2]]
+    )
+    return _table(
+        "references",
+        "/tags",
+        t_s[row],
+        kind="fiducial",
+        frame_id="base_link",
+        child_frame_id=[f"tag_{k}" for k in tag],
+        covariance=np.full((len(row), 36), np.nan),
+        **_pose_columns(xyyaw),
     )
 
 

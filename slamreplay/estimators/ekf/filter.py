@@ -1,0 +1,284 @@
+"""The filter over a whole log: events in order of time, starts, and starting again when lost."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import chdtri
+
+from slamreplay.bundle.track import PoseTrack
+from slamreplay.estimators.ekf import kernels
+from slamreplay.estimators.ekf.consensus import LEAST_AGREEING, locate, window_of
+from slamreplay.estimators.ekf.motion import Steps, odometry_known, steps_between
+from slamreplay.estimators.ekf.noise import Noise
+from slamreplay.estimators.ekf.observations import Observations
+from slamreplay.estimators.start import Start
+from slamreplay.geometry import se2
+from slamreplay.geometry.times import NS_PER_S
+
+#: The robot places itself by the sightings of this time, at most so many of them, and tries it no
+#: more often than that.
+WINDOW_NS, WINDOW_MOST, RETRY_NS = 10 * NS_PER_S, 16, NS_PER_S
+#: Lost: at least so many sightings in a row, over at least this time, were all rejected.
+LOST_LEAST, LOST_NS = 5, 10 * NS_PER_S
+#: Things whose lasting errors are followed at a time.
+SLOTS = 8
+
+
+@dataclass(frozen=True, eq=False)
+class Evidence:
+    """What the filter reads of a log.
+
+    Attributes:
+        odometry: base in odom.
+        observations: of surveyed things.
+        row_ns: (N,) times at which a pose is wanted, sorted.
+        given: poses that somebody gave, at rows of `row_ns`, in order; the first is anywhere where
+            nobody did.
+    """
+
+    odometry: PoseTrack
+    observations: Observations
+    row_ns: NDArray[np.int64]
+    given: Sequence[Start]
+
+    def of_starts(self) -> Evidence:
+        """The same with rows only where poses were given."""
+        rows = self.row_ns[[start.row for start in self.given]]
+        given = [replace(start, row=k) for k, start in enumerate(self.given)]
+        return replace(self, row_ns=rows, given=given)
+
+
+@dataclass(frozen=True, eq=False)
+class Filtered:
+    """What the filter made of N rows and M observations.
+
+    Attributes:
+        xyyaw: (N, 3) base in map, NaN before the first start and where odometry is silent.
+        cov: (N, 3, 3) covariance of it.
+        updated: (N,) 1 where a sighting was taken in since the row before, NaN without a pose.
+        residual: (M, 3) measured minus predicted range, bearing, heading; NaN where not used.
+        S: (M, 3, 3) covariance predicted for it.
+        status: (M,) `kernels.UNUSED`, ACCEPTED or REJECTED.
+        located: how often the filter placed itself by sightings alone.
+        recoveries: how often of these it had been lost.
+        silent: observations at times at which odometry says nothing.
+    """
+
+    xyyaw: se2.Array
+    cov: se2.Array
+    updated: se2.Array
+    residual: se2.Array
+    S: se2.Array
+    status: NDArray[np.int64]
+    located: int
+    recoveries: int
+    silent: int
+
+
+_NEVER = np.iinfo(np.int64).min
+
+
+@dataclass(frozen=True, eq=False)
+class _Events:
+    """E moments in order of time, each a sighting or a row (the other index is -1)."""
+
+    t_ns: NDArray[np.int64]
+    steps: Steps
+    sighting: NDArray[np.int64]
+    row: NDArray[np.int64]
+
+    def __len__(self) -> int:
+        return len(self.t_ns)
+
+
+@dataclass(eq=False)
+class _State:
+    """Pose and lasting errors, whose these are, and `lost` as the kernel keeps it."""
+
+    x: se2.Array
+    P: se2.Array
+    holder: NDArray[np.int64]
+    seen: NDArray[np.int64]
+    lost: NDArray[np.int64] = field(default_factory=lambda: np.zeros(3, dtype=np.int64))
+
+    @classmethod
+    def at(cls, pose: se2.Array, cov: se2.Array, lasting: se2.Array) -> _State:
+        slots = SLOTS if lasting.any() else 0
+        x, P = np.zeros(3 + 2 * slots), np.zeros((3 + 2 * slots, 3 + 2 * slots))
+        x[:3], P[:3, :3] = pose, cov
+        errors = np.arange(3, len(x))
+        P[errors, errors] = np.tile(lasting, slots)
+        nobody = np.full(slots, -1, dtype=np.int64)
+        return cls(x, P, nobody, nobody.copy())
+
+
+def gates_of(probability: float) -> se2.Array:
+    """(4,) largest NIS of a sighting that is taken in, by its dimension.
+
+    Args:
+        probability: with which a sighting that the model describes is taken in.
+    """
+    return np.array([0.0, *(float(chdtri(m, 1.0 - probability)) for m in (1, 2, 3))])
+
+
+def filtered(
+    evidence: Evidence,
+    noise: Noise,
+    gates: se2.Array,
+    process_scale: float = 1.0,
+    measurement_scale: float = 1.0,
+) -> Filtered:
+    """One pass over the log.
+
+    Args:
+        evidence: what there is.
+        noise: the settings.
+        gates: (4,) see `gates_of`.
+        process_scale: ratio by which the covariance of motion is multiplied.
+        measurement_scale: ratio for that of sightings, their lasting errors included.
+    """
+    this = _Pass(evidence, noise, gates, process_scale, measurement_scale)
+    events = this.events
+    given = _starts_by_event(evidence.given, events)
+    state: _State | None = None
+    event = min(given, default=len(events))
+    while event < len(events):
+        start = given.pop(event, None)
+        end = min(given, default=len(events))
+        if start is not None:
+            state = this.started(start)
+        if state is None:
+            event, state = this.search(event, end)
+        else:
+            event = this.follow(state, event, end, starts=start is not None)
+            if event < end:
+                state = this.recovered(event - 1) or state
+    return this.out()
+
+
+class _Pass:
+    """The arrays that one pass reads and fills in, and the steps it consists of."""
+
+    def __init__(
+        self,
+        evidence: Evidence,
+        noise: Noise,
+        gates: se2.Array,
+        process_scale: float,
+        measurement_scale: float,
+    ) -> None:
+        seen, N, M = evidence.observations, len(evidence.row_ns), len(evidence.observations)
+        self.evidence, self.noise, self.gates = evidence, noise, gates
+        self.events, self.silent = _events(evidence, noise, process_scale)
+        self.process_scale = process_scale
+        self.polar = seen.corrected(noise)
+        self.R = seen.covariance(noise, measurement_scale)
+        lasting = np.array([noise.lasting_range_per_m, noise.lasting_bearing_rad]) ** 2
+        self.lasting = measurement_scale * lasting
+        self.xyyaw, self.cov = np.full((N, 3), np.nan), np.full((N, 3, 3), np.nan)
+        self.updated, self.status = np.full(N, np.nan), np.zeros(M, dtype=np.int64)
+        self.residual, self.S = np.full((M, 3), np.nan), np.full((M, 3, 3), np.nan)
+        self.retry_ns, self.located, self.recoveries = _NEVER, 0, 0
+
+    def started(self, start: Start) -> _State | None:
+        """The state at a pose that was given; None where the filter is to find its own."""
+        self.retry_ns = _NEVER
+        if start.xyyaw is None:
+            return None
+        return _State.at(start.xyyaw, start.cov, self.lasting)
+
+    def search(self, first: int, end: int) -> tuple[int, _State | None]:
+        """The state at the first event from which sightings tell it, and the event after that."""
+        for event in (first + np.flatnonzero(self.events.sighting[first:end] >= 0)).tolist():
+            if self.events.t_ns[event] >= self.retry_ns:
+                state = self._located(event)
+                if state is not None:
+                    return event + 1, state
+        return end, None
+
+    def recovered(self, event: int) -> _State | None:
+        """The state at an event, by the sightings up to there; None where they tell none."""
+        state = self._located(event)
+        self.recoveries += state is not None
+        return state
+
+    def follow(self, state: _State, first: int, end: int, *, starts: bool) -> int:
+        """Run the filter from an event on; returns where it stopped: `end`, or behind a loss."""
+        events, seen = self.events, self.evidence.observations
+        return int(
+            kernels.run(
+                first, end, starts, events.t_ns, events.steps.xyyaw, events.steps.Q,
+                events.sighting, events.row, self.polar, self.R, seen.dims, seen.thing,
+                seen.places, self.gates, self.lasting, self.noise.lasting_s,
+                np.array([LOST_LEAST, LOST_NS]), self.retry_ns, state.x, state.P, state.holder,
+                state.seen, state.lost, self.xyyaw, self.cov, self.updated, self.residual, self.S,
+                self.status,
+            )
+        )  # fmt: skip
+
+    def out(self) -> Filtered:
+        """What has been filled in."""
+        return Filtered(
+            self.xyyaw, self.cov, self.updated, self.residual, self.S, self.status, self.located,
+            self.recoveries, self.silent,
+        )  # fmt: skip
+
+    def _located(self, event: int) -> _State | None:
+        """The state at an event by the sightings of the window that ends there."""
+        events, seen = self.events, self.evidence.observations
+        self.retry_ns = int(events.t_ns[event]) + RETRY_NS
+        first = np.searchsorted(events.t_ns, events.t_ns[event] - WINDOW_NS)
+        window = first + np.flatnonzero(events.sighting[first : event + 1] >= 0)
+        window = window[-WINDOW_MOST:]
+        rows = events.sighting[window]
+        if len(rows) < LEAST_AGREEING:
+            return None
+        steps = steps_between(self.evidence.odometry, events.t_ns[window], self.noise)
+        R, thing = self.R[rows].copy(), seen.thing[rows]
+        # A lasting error is one and the same in all sightings of a thing: they share its weight.
+        times = (thing[:, None] == thing[None, :]).sum(axis=1)
+        R[:, 0, 0] += times * self.lasting[0] * self.polar[rows, 0] ** 2
+        R[:, 1, 1] += times * self.lasting[1]
+        found = locate(
+            window_of(
+                self.polar[rows], seen.dims[rows], R, seen.places[thing], thing, steps.xyyaw,
+                self.process_scale * steps.Q,
+            )
+        )  # fmt: skip
+        if found is None:
+            return None
+        state = _State.at(*found, self.lasting)
+        state.lost[2] = 1
+        self.located += 1
+        return state
+
+
+def _events(evidence: Evidence, noise: Noise, process_scale: float) -> tuple[_Events, int]:
+    """Events at which odometry is known, and how many sightings came at other times."""
+    M = len(evidence.observations)
+    t_ns = np.concatenate([evidence.observations.t_ns, evidence.row_ns])
+    known = odometry_known(evidence.odometry, t_ns, noise)
+    order = np.argsort(t_ns, kind="stable")  # at equal times sightings come before rows
+    order = order[known[order]]
+    steps = steps_between(evidence.odometry, t_ns[order], noise)
+    events = _Events(
+        t_ns[order],
+        Steps(steps.xyyaw, process_scale * steps.Q),
+        np.where(order < M, order, -1),
+        np.where(order >= M, order - M, -1),
+    )
+    return events, int((~known[:M]).sum())
+
+
+def _starts_by_event(given: Sequence[Start], events: _Events) -> dict[int, Start]:
+    """Each start at the first event of its time, or the next one whose odometry is known."""
+    found = {}
+    for start in given:
+        later = np.flatnonzero(events.row >= start.row)
+        if len(later):
+            found[int(np.searchsorted(events.t_ns, events.t_ns[later[0]]))] = start
+    return found

@@ -1,0 +1,336 @@
+"""The filter's loop over events, compiled; tests hold each step against estimators.kalman.
+
+The state is x, y, yaw and, for each of the `slots`, the lasting errors of one thing: of its range
+(as a share of it) and of its bearing. A thing that is seen again takes its own slot, a new one a
+free slot or the one not seen for longest.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+#: What became of a sighting.
+UNUSED, ACCEPTED, REJECTED = 0, 1, 2
+#: A thing nearer than this has no bearing, m.
+NEAREST_M = 0.05
+_TWO_PI = 2.0 * np.pi
+
+
+@njit(cache=True)
+def wrapped(angle):  # type: ignore[no-untyped-def]
+    """An angle brought into [-pi, pi)."""
+    return (angle + np.pi) % _TWO_PI - np.pi
+
+
+@njit(cache=True)
+def predict(x, P, step, Q):  # type: ignore[no-untyped-def]
+    """Carry pose and covariance over an increment, in place.
+
+    Args: x (n,) and P (n, n), of which the first three are x y yaw along the parent's axes; step
+    (3,) and its covariance Q (3, 3) in axes of the base before it.
+    """
+    cos, sin = np.cos(x[2]), np.sin(x[2])
+    dx, dy = cos * step[0] - sin * step[1], sin * step[0] + cos * step[1]
+    x[0] += dx
+    x[1] += dy
+    x[2] = wrapped(x[2] + step[2])
+    n = len(x)
+    for j in range(n):  # F P: an error of heading moves the end of the step sideways
+        P[0, j] -= dy * P[2, j]
+        P[1, j] += dx * P[2, j]
+    for i in range(n):
+        P[i, 0] -= dy * P[i, 2]
+        P[i, 1] += dx * P[i, 2]
+    a, b, d = Q[0, 0], Q[0, 1], Q[1, 1]
+    P[0, 0] += cos * cos * a - 2.0 * cos * sin * b + sin * sin * d
+    P[1, 1] += sin * sin * a + 2.0 * cos * sin * b + cos * cos * d
+    mixed = cos * sin * (a - d) + (cos * cos - sin * sin) * b
+    P[0, 1] += mixed
+    P[1, 0] += mixed
+    u, v = cos * Q[0, 2] - sin * Q[1, 2], sin * Q[0, 2] + cos * Q[1, 2]
+    P[0, 2] += u
+    P[2, 0] += u
+    P[1, 2] += v
+    P[2, 1] += v
+    P[2, 2] += Q[2, 2]
+
+
+@njit(cache=True)
+def fade(x, P, keep, variance):  # type: ignore[no-untyped-def]
+    """Let lasting errors forget, in place: each keeps a share `keep` of itself, in [0, 1].
+
+    `variance` (2,) is what the errors of range and bearing have without any sighting.
+    """
+    n = len(x)
+    for i in range(3, n):
+        x[i] *= keep
+        for j in range(3):
+            P[i, j] *= keep
+            P[j, i] *= keep
+        for j in range(3, n):
+            P[i, j] *= keep * keep
+        P[i, i] += (1.0 - keep * keep) * variance[(i - 3) % 2]
+
+
+@njit(cache=True)
+def measurement(x, place, slot, m, H, expected):  # type: ignore[no-untyped-def]
+    """What a thing at `place` (3,) should look like from the state: `expected` (m,) and H (m, n).
+
+    Both are filled in: range (with its lasting error), bearing, and for m = 3 the heading.
+    """
+    H[:, :] = 0.0
+    away_x, away_y = place[0] - x[0], place[1] - x[1]
+    reach = max(np.hypot(away_x, away_y), NEAREST_M)
+    share = x[slot] if slot > 0 else 0.0
+    expected[0] = reach * (1.0 + share)
+    H[0, 0] = -away_x / reach * (1.0 + share)
+    H[0, 1] = -away_y / reach * (1.0 + share)
+    expected[1] = np.arctan2(away_y, away_x) - x[2]
+    H[1, 0] = away_y / (reach * reach)
+    H[1, 1] = -away_x / (reach * reach)
+    H[1, 2] = -1.0
+    if slot > 0:
+        H[0, slot] = reach
+        H[1, slot + 1] = 1.0
+        expected[1] += x[slot + 1]
+    if m == 3:
+        expected[2] = place[2] - x[2]
+        H[2, 2] = -1.0
+
+
+@njit(cache=True)
+def times_rows(P, H, m, out):  # type: ignore[no-untyped-def]
+    """Fill in `out` (m, n) with H P for the first m rows of a sparse H (m, n)."""
+    n = P.shape[0]
+    for r in range(m):
+        out[r, :] = 0.0
+        for i in range(n):
+            if H[r, i] != 0.0:
+                for j in range(n):
+                    out[r, j] += H[r, i] * P[i, j]
+
+
+@njit(cache=True)
+def innovate(P, H, R, m, HP, S):  # type: ignore[no-untyped-def]
+    """Fill in HP (m, n) and S = H P H' + R (m, m)."""
+    times_rows(P, H, m, HP)
+    for r in range(m):
+        for c in range(m):
+            total = R[r, c]
+            for i in range(P.shape[0]):
+                total += HP[r, i] * H[c, i]
+            S[r, c] = total
+
+
+@njit(cache=True)
+def lower(S, m, L):  # type: ignore[no-untyped-def]
+    """Fill in the Cholesky factor L (m, m) of S; False where S is not positive definite."""
+    for i in range(m):
+        for j in range(i + 1):
+            total = S[i, j]
+            for k in range(j):
+                total -= L[i, k] * L[j, k]
+            if i == j:
+                if not total > 0.0:
+                    return False
+                L[i, i] = np.sqrt(total)
+            else:
+                L[i, j] = total / L[j, j]
+    return True
+
+
+@njit(cache=True)
+def squared(L, residual, m):  # type: ignore[no-untyped-def]
+    """|L^-1 residual|^2."""
+    white = np.empty(m)
+    total = 0.0
+    for i in range(m):
+        value = residual[i]
+        for k in range(i):
+            value -= L[i, k] * white[k]
+        white[i] = value / L[i, i]
+        total += white[i] * white[i]
+    return total
+
+
+@njit(cache=True)
+def gain_of(HP, L, m, K):  # type: ignore[no-untyped-def]
+    """Fill in the gain K (m, n), transposed: each column solves L L' k = HP[:, i]."""
+    for i in range(HP.shape[1]):
+        for r in range(m):
+            value = HP[r, i]
+            for k in range(r):
+                value -= L[r, k] * K[k, i]
+            K[r, i] = value / L[r, r]
+        for r in range(m - 1, -1, -1):
+            value = K[r, i]
+            for k in range(r + 1, m):
+                value -= L[k, r] * K[k, i]
+            K[r, i] = value / L[r, r]
+
+
+@njit(cache=True)
+def less_outer(P, U, V, m):  # type: ignore[no-untyped-def]
+    """Subtract from P (n, n) the product U' V of the first m rows (m, n), in place."""
+    n = P.shape[0]
+    for r in range(m):
+        for i in range(n):
+            for j in range(n):
+                P[i, j] -= U[r, i] * V[r, j]
+
+
+@njit(cache=True)
+def correct(x, P, H, R, m, HP, L, residual):  # type: ignore[no-untyped-def]
+    """Take a measurement in, in place: Joseph's form (I - K H) P (I - K H)' + K R K'.
+
+    With A = P - K H P this is A - (A H' - K R) K', from left to right; A H' = K R only for an
+    exact gain, and that the form forgives one that is not is what it is for.
+    """
+    n = len(x)
+    K, rest = np.empty((m, n)), np.empty((m, n))
+    gain_of(HP, L, m, K)
+    for r in range(m):
+        for i in range(n):
+            x[i] += K[r, i] * residual[r]
+    x[2] = wrapped(x[2])
+    less_outer(P, K, HP, m)
+    for r in range(m):
+        for i in range(n):
+            rest[r, i] = 0.0
+            for j in range(n):
+                rest[r, i] += P[i, j] * H[r, j]
+            for c in range(m):
+                rest[r, i] -= K[c, i] * R[c, r]
+    less_outer(P, rest, K, m)
+    for i in range(n):
+        for j in range(i):
+            P[i, j] = P[j, i] = 0.5 * (P[i, j] + P[j, i])
+
+
+@njit(cache=True)
+def slot_of(thing, holder, seen, x, P, variance):  # type: ignore[no-untyped-def]
+    """Index in the state of a thing's lasting errors, made free where need be; 0 without slots.
+
+    `holder` (slots,) says whose each slot is (-1: free), `seen` (slots,) at which event it was
+    seen last; both are kept up to date by the caller.
+    """
+    oldest = -1
+    for k in range(len(holder)):
+        if holder[k] == thing:
+            return 3 + 2 * k
+        if oldest < 0 or seen[k] < seen[oldest]:
+            oldest = k
+    if oldest < 0:
+        return 0
+    holder[oldest] = thing
+    at = 3 + 2 * oldest
+    for i in range(at, at + 2):
+        x[i] = 0.0
+        P[i, :] = 0.0
+        P[:, i] = 0.0
+        P[i, i] = variance[i - at]
+    return at
+
+
+@njit(cache=True)
+def take_in(s, slot, place, sensed, R, m, gate, x, P, H, HP, S, L, residual_out, S_out):  # type: ignore[no-untyped-def]
+    """Hold sighting `s` against the state, and correct it where its NIS is within the gate.
+
+    Writes residual and S of the prior to row `s` of the outputs; returns ACCEPTED or REJECTED.
+    """
+    expected, residual = np.zeros(3), np.zeros(3)
+    measurement(x, place, slot, m, H, expected)
+    for r in range(m):
+        residual[r] = sensed[s, r] - expected[r]
+        if r > 0:
+            residual[r] = wrapped(residual[r])
+    innovate(P, H, R[s], m, HP, S)
+    for r in range(m):
+        residual_out[s, r] = residual[r]
+        for c in range(m):
+            S_out[s, r, c] = S[r, c]
+    if not lower(S, m, L) or squared(L, residual, m) > gate:
+        return REJECTED
+    correct(x, P, H, R[s], m, HP, L, residual)
+    return ACCEPTED
+
+
+@njit(cache=True)
+def run(  # type: ignore[no-untyped-def]
+    first,
+    last,
+    starts,
+    t_ns,
+    steps,
+    Q,
+    sighting,
+    row,
+    sensed,
+    R,
+    dims,
+    things,
+    places,
+    gates,
+    lasting,
+    lasting_s,
+    patience,
+    retry_ns,
+    x,
+    P,
+    holder,
+    seen,
+    lost,
+    xyyaw_out,
+    cov_out,
+    updated_out,
+    residual_out,
+    S_out,
+    status_out,
+):
+    """Run events first to last - 1; returns the first event not run, which is `last` in the end.
+
+    It ends early behind an event at which every sighting of the last `patience[1]` ns and at
+    least `patience[0]` of them were rejected, not before `retry_ns`.
+
+    Args: `starts` says that the state is already that at the first event, and not at the one
+    before it. Of the events (E,): t_ns, steps (E, 3) and Q (E, 3, 3) from the one before,
+    `sighting` and `row` the index of what happens there or -1. Of the sightings (M,): `sensed`
+    (M, 3), R (M, 3, 3), dims, things, and places (T, 3) of the things; `gates` (4,) the largest
+    NIS for each dimension. `lasting` (2,) variances of lasting errors, `lasting_s` their time
+    constant. The state x (n,), P (n, n), `holder` and `seen` (slots,), `lost` (3,): number and
+    first time of the rejections in a row, and whether a sighting was taken in since the last row.
+    Outputs are filled in by row and by sighting; they and the state change in place.
+    """
+    n = len(x)
+    H, HP, S, L = np.zeros((3, n)), np.zeros((3, n)), np.zeros((3, 3)), np.zeros((3, 3))
+    for e in range(first, last):
+        if e > first or not starts:
+            predict(x, P, steps[e], Q[e])
+            if n > 3:
+                fade(x, P, np.exp((t_ns[e - 1] - t_ns[e]) * 1e-9 / lasting_s), lasting)
+        s, k = sighting[e], row[e]
+        if k >= 0:
+            xyyaw_out[k] = x[:3]
+            cov_out[k] = P[:3, :3]
+            updated_out[k] = lost[2]
+            lost[2] = 0
+        if s < 0:
+            continue
+        slot = slot_of(things[s], holder, seen, x, P, lasting)
+        if slot > 0:
+            seen[(slot - 3) // 2] = e
+        m, place = dims[s], places[things[s]]
+        status_out[s] = take_in(
+            s, slot, place, sensed, R, m, gates[m], x, P, H, HP, S, L, residual_out, S_out
+        )
+        if status_out[s] == ACCEPTED:
+            lost[0], lost[2] = 0, 1
+            continue
+        if lost[0] == 0:
+            lost[1] = t_ns[e]
+        lost[0] += 1
+        silent = lost[0] >= patience[0] and t_ns[e] - lost[1] >= patience[1]
+        if silent and t_ns[e] >= retry_ns:
+            return e + 1
+    return last

@@ -1,0 +1,109 @@
+"""Sightings of things with a surveyed place, as ranges, bearings and headings with their noise."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from slamreplay.bundle.sightings import Sightings
+from slamreplay.estimators.ekf.kernels import NEAREST_M
+from slamreplay.estimators.ekf.noise import Noise
+from slamreplay.geometry import se2
+
+
+@dataclass(frozen=True, eq=False)
+class Observations:
+    """M sightings of T things, in order of time.
+
+    Attributes:
+        t_ns: (M,) when.
+        kind: (M,) fiducial or dock.
+        thing: (M,) which one, 0 to T - 1.
+        places: (T, 3) of the things in the map, m, m, rad; NaN where a heading is not surveyed.
+        polar: (M, 3) range m, bearing rad, heading rad in the base, as sensed.
+        dims: (M,) 3 where the heading was sensed and is surveyed, else 2.
+        stated: (M, 3, 3) covariance of `polar` that the log states, NaN where it does not.
+        unsurveyed: sightings of things without a survey, which are left out.
+    """
+
+    t_ns: NDArray[np.int64]
+    kind: NDArray[np.object_]
+    thing: NDArray[np.int64]
+    places: se2.Array
+    polar: se2.Array
+    dims: NDArray[np.int64]
+    stated: se2.Array
+    unsurveyed: int
+
+    def __len__(self) -> int:
+        return len(self.t_ns)
+
+    def take(self, index: NDArray[np.int64] | NDArray[np.bool_]) -> Observations:
+        """Those at an index array or under a mask; the things stay the same."""
+        return Observations(
+            self.t_ns[index],
+            self.kind[index],
+            self.thing[index],
+            self.places,
+            self.polar[index],
+            self.dims[index],
+            self.stated[index],
+            self.unsurveyed,
+        )
+
+    def corrected(self, noise: Noise) -> se2.Array:
+        """(M, 3) `polar` without its constant errors."""
+        out = self.polar.copy()
+        out[:, 0] = np.maximum((out[:, 0] - noise.range_offset_m) / noise.range_ratio, NEAREST_M)
+        out[:, 1] = se2.wrap_angle(out[:, 1] - noise.bearing_offset_rad)
+        return out
+
+    def covariance(self, noise: Noise, scale: float = 1.0) -> se2.Array:
+        """(M, 3, 3) of `polar`, without lasting errors: the log's own, else from the settings.
+
+        Args:
+            noise: the settings.
+            scale: ratio by which all variances are multiplied.
+        """
+        R = np.zeros((len(self), 3, 3))
+        R[:, 0, 0] = noise.range_m**2 + (noise.range_per_m * self.polar[:, 0]) ** 2
+        R[:, 1, 1], R[:, 2, 2] = noise.bearing_rad**2, noise.heading_rad**2
+        told = np.isfinite(self.stated[:, :2, :2]).all(axis=(1, 2))
+        R[told, :2, :2] = noise.stated_ratio**2 * self.stated[told, :2, :2]
+        told = np.isfinite(self.stated[:, 2, 2])
+        R[told, 2, 2] = noise.stated_ratio**2 * self.stated[told, 2, 2]
+        return scale * R
+
+
+def observations_of(sightings: Sightings) -> Observations:
+    """The sightings of surveyed things; the others are counted.
+
+    A sensed point (x, y) has the range |(x, y)| and the bearing atan2(y, x); its stated covariance
+    goes over with the derivative of the two by x and y.
+    """
+    surveyed = np.isin(sightings.name, sorted(sightings.surveyed))
+    rows = np.flatnonzero(surveyed)
+    rows = rows[np.argsort(sightings.t_ns[rows], kind="stable")]
+    names, thing = np.unique(sightings.name[rows].astype(str), return_inverse=True)
+    places = np.array([sightings.surveyed[name] for name in names]).reshape(-1, 3)
+    x, y, yaw = sightings.xyyaw[rows].T
+    reach, bearing = np.maximum(np.hypot(x, y), NEAREST_M), np.arctan2(y, x)
+    cos, sin = np.cos(bearing), np.sin(bearing)
+    J = np.zeros((len(rows), 2, 2))
+    J[:, 0, 0], J[:, 0, 1] = cos, sin
+    J[:, 1, 0], J[:, 1, 1] = -sin / reach, cos / reach
+    stated = sightings.stated[rows].copy()
+    stated[:, :2, :2] = J @ stated[:, :2, :2] @ np.swapaxes(J, 1, 2)
+    turned = np.isfinite(yaw) & np.isfinite(places[thing, 2])
+    return Observations(
+        sightings.t_ns[rows],
+        sightings.kind[rows],
+        thing.astype(np.int64),
+        places,
+        np.column_stack([reach, bearing, np.where(turned, yaw, 0.0)]),
+        np.where(turned, 3, 2).astype(np.int64),
+        stated,
+        int((~surveyed).sum()),
+    )

@@ -1,0 +1,147 @@
+"""The extended Kalman filter over a whole log."""
+
+import numpy as np
+import pytest
+
+from slamreplay.bundle.run import Run, Trial, read_run, run_bytes
+from slamreplay.bundle.schema import TABLES
+from slamreplay.bundle.tables import Table
+from slamreplay.errors import NotApplicableError
+from slamreplay.estimators.ekf.estimator import MEASUREMENT_NOISE, PROCESS_NOISE, Ekf
+from slamreplay.estimators.ekf.noise import Noise
+from slamreplay.estimators.start import GLOBAL
+from slamreplay.geometry import se2
+from slamreplay.testing import edits
+from slamreplay.testing.estimators import estimate_bytes
+from slamreplay.testing.synthetic import START_NS, synthetic_bundle, true_path
+
+TAGGED = synthetic_bundle(seconds=20.0, with_tags=True)
+NOBODY_SAID = synthetic_bundle(
+    seconds=20.0, with_tags=True, with_belief=True, with_initial_pose=False
+)
+
+
+def error(track) -> np.ndarray:
+    return se2.between(true_path((track.t_ns - START_NS) / 1e9), track.xyyaw)
+
+
+def test_it_follows_the_robot_from_a_wrong_start():
+    estimate = Ekf().run(TAGGED.view(), seed=1)
+    off = error(estimate.track)
+
+    assert np.hypot(*off[0, :2]) > 0.1
+    assert np.hypot(*off[50:, :2].T).max() < 0.1
+    assert np.abs(off[50:, 2]).max() < 0.05
+    assert estimate.track.frame_id == "map"
+    assert 0.2 < estimate.diagnostics["updated"].mean() < 0.8
+
+
+def test_points_and_tags_with_headings_are_sets_of_their_own():
+    sets = {i.source: i for i in Ekf().run(TAGGED.view(), seed=1).innovations}
+
+    assert list(sets) == ["fiducial", "fiducial with heading"]
+    assert sets["fiducial"].axes == ("range m", "bearing rad")
+    assert sets["fiducial with heading"].axes == ("range m", "bearing rad", "heading rad")
+    for one in sets.values():
+        m = len(one.axes)
+        assert one.residual.shape == (len(one.t_ns), m)
+        assert one.S.shape == (len(one.t_ns), m, m)
+        assert (np.diff(one.t_ns) >= 0).all()
+        assert one.accepted.mean() > 0.95
+
+
+def test_without_any_start_it_places_itself():
+    view = TAGGED.view().with_setting(GLOBAL, 1.0)
+    estimate = Ekf().run(view, seed=1)
+    track = estimate.track
+
+    first = int(np.argmax(track.has_pose))
+    assert first > 0
+    assert not np.isfinite(track.cov[:first]).any()
+    assert track.has_pose[first:].all()
+    assert estimate.diagnostics["updated"][first] == 1
+    assert np.hypot(*error(track)[first:, :2].T).max() < 0.15
+    assert estimate.scalars["located_by_sightings"] == 1
+    assert estimate.scalars["sightings_before_start"] >= 3
+
+
+def test_things_without_a_survey_are_counted_and_not_used():
+    transforms = TAGGED.table("transforms")
+    known = TAGGED.view().with_table(transforms.take(transforms["child_frame"] != "tag_1"))
+    seen = (TAGGED.table("references")["child_frame_id"] == "tag_1").sum()
+
+    scalars = Ekf().run(known, seed=1).scalars
+    assert scalars["sightings_without_survey"] == seen > 0
+    none = transforms.take(~np.char.startswith(transforms["child_frame"].astype(str), "tag"))
+    with pytest.raises(NotApplicableError, match="survey"):
+        Ekf().run(TAGGED.view().with_table(none), seed=1)
+
+
+def test_a_log_without_sightings_is_named():
+    with pytest.raises(NotApplicableError, match="sightings"):
+        Ekf().run(edits.without(TAGGED, "sightings").view(), seed=0)
+
+
+def test_wrong_barcodes_are_rejected_and_kept():
+    references = TAGGED.table("references")
+    names = references["child_frame_id"].copy()
+    wrong = np.flatnonzero(names == "tag_0")[3::7]
+    names[wrong] = "tag_3"
+    view = TAGGED.view().with_table(references.replace(child_frame_id=names))
+    estimate = Ekf().run(view, seed=1)
+
+    sets = [i for i in estimate.innovations if i.source == "fiducial with heading"]
+    misread = np.isin(sets[0].t_ns, references.t_ns[wrong])
+    assert (~sets[0].accepted).sum() >= len(wrong) > 3
+    assert not (~sets[0].accepted[~misread]).sum() > 2
+    assert np.hypot(*error(estimate.track)[50:, :2].T).max() < 0.1
+
+
+def test_a_robot_that_was_carried_away_finds_itself_again():
+    """Odometry is rewritten so that the robot jumps: its own sightings tell it from then on."""
+    carried = synthetic_bundle(seconds=40.0, with_tags=True)
+    transforms = carried.table("transforms")
+    late = (transforms["child_frame"] == "base_link") & (transforms.t_ns > START_NS + 10 * 10**9)
+    position = transforms["translation_xyz"].copy()
+    position[late, :2] += (4.0, 3.0)
+    view = carried.view().with_table(transforms.replace(translation_xyz=position))
+    estimate = Ekf().run(view, seed=1)
+
+    assert estimate.scalars["recoveries"] == 1
+    assert np.hypot(*error(estimate.track)[150, :2]) > 1.0
+    assert np.hypot(*error(estimate.track)[250:, :2].T).max() < 0.15
+
+
+def test_told_half_the_noise_it_is_twice_as_sure():
+    half = TAGGED.view().with_setting(PROCESS_NOISE, 0.25).with_setting(MEASUREMENT_NOISE, 0.25)
+    half = half.with_table(Table.empty(TABLES["initial_poses"])).with_setting(GLOBAL, 1.0)
+    whole = TAGGED.view().with_setting(GLOBAL, 1.0)
+
+    sure, plain = (Ekf().run(v, seed=1).track.cov[-1] for v in (half, whole))
+    np.testing.assert_allclose(sure, plain / 4.0, rtol=0.01)
+
+
+def test_the_same_bits_twice_and_with_a_lying_reference():
+    first, again = (estimate_bytes(Ekf().run(TAGGED.view(), seed=3)) for _ in range(2))
+    lied = estimate_bytes(Ekf().run(edits.poisoned(TAGGED).view(), seed=3))
+
+    assert first == again == lied
+
+
+def test_a_run_keeps_axes_and_scalars(tmp_path):
+    run = Run(Trial("b", "ekf", 0), Ekf().run(TAGGED.view(), seed=1))
+    (tmp_path / "r.npz").write_bytes(run_bytes(run))
+    back = read_run(tmp_path / "r.npz").estimate
+
+    assert [i.axes for i in back.innovations] == [i.axes for i in run.estimate.innovations]
+    assert dict(back.scalars) == dict(run.estimate.scalars)
+    assert run_bytes(Run(run.trial, back)) == run_bytes(run)
+
+
+def test_lasting_errors_of_sightings_keep_the_filter_modest():
+    lasting = Noise(lasting_range_per_m=0.05, lasting_bearing_rad=0.02)
+    plain, modest = (Ekf(noise).run(TAGGED.view(), seed=1).track for noise in (Noise(), lasting))
+
+    assert (np.trace(modest.cov[50:], axis1=1, axis2=2)
+            > 1.5 * np.trace(plain.cov[50:], axis1=1, axis2=2)).mean() > 0.9  # fmt: skip
+    assert np.hypot(*error(modest)[50:, :2].T).max() < 0.15
