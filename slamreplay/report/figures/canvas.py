@@ -100,6 +100,17 @@ def svg_bytes(figure: Figure) -> bytes:
     return _PATH.sub(_shortened, text).encode()
 
 
+def png_bytes(figure: Figure, dpi: int = 130) -> bytes:
+    """The figure as PNG of 128 colours, a third of the size: same figure, same bytes."""
+    from PIL import Image
+
+    sink = io.BytesIO()
+    figure.savefig(sink, format="png", dpi=dpi)
+    picture, sink = Image.open(sink).convert("RGB"), io.BytesIO()
+    picture.quantize(128, dither=Image.Dither.NONE).save(sink, "png", optimize=True)
+    return sink.getvalue()
+
+
 # Hundredths of a point cannot be seen, and make up half of the file.
 _PATH = re.compile(r' d="([^"]*)"')
 _DECIMALS = re.compile(r"(\.\d\d)\d+")
