@@ -8,6 +8,7 @@ from scipy.stats import binom, chi2
 
 from slamreplay.consistency.autoregression import autocorrelation_of, burg, chosen_reflection
 from slamreplay.consistency.error_samples import ErrorSamples, error_samples
+from slamreplay.consistency.intervals import mean_interval
 from slamreplay.consistency.mean_test import N_EFF_MIN, mean_test
 
 
@@ -84,6 +85,12 @@ def test_each_axis_may_have_a_memory_of_its_own():
         missed += not test.low <= test.mean <= test.high
 
     assert missed <= 12  # 36 % with one model for all
+
+
+def test_published_bounds_of_the_average_over_runs_are_reproduced():
+    # 95 % bounds: n = 3, N = 50 and n = 6, N = 10.
+    assert mean_interval(3, 50, 0.05) == pytest.approx((2.36, 3.72), abs=0.01)
+    assert mean_interval(6, 10, 0.05) == pytest.approx((4.05, 8.33), abs=0.01)
 
 
 def test_interval_of_white_errors_is_scipys():
