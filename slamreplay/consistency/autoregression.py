@@ -11,6 +11,8 @@ from slamreplay.geometry.se2 import Array
 ORDER_MAX = 20
 #: What an estimated partial autocorrelation is kept below: 1 would never forget.
 _ALMOST_ONE = 0.99999
+#: A correlation below this is none.
+_FORGOTTEN = 1e-12
 
 
 def burg(series: Array, order: int) -> tuple[Array, Array]:
@@ -20,15 +22,27 @@ def burg(series: Array, order: int) -> tuple[Array, Array]:
     summed over the columns, m realisations of one process of zero mean. Nothing is subtracted: a
     consistent error has no mean, and an estimated one would make short series look whiter.
     """
-    forward = backward = np.asarray(series, dtype=np.float64)
+    forward = np.array(series, dtype=np.float64)
+    backward = forward.copy()
+    one, two = np.empty_like(forward), np.empty_like(forward)
     reflection, left = np.zeros(order), np.ones(order + 1)
     for k in range(order):
-        ahead, behind = forward[1:], backward[:-1]
-        power = float(np.vdot(ahead, ahead) + np.vdot(behind, behind))
-        r = 2.0 * float(np.vdot(ahead, behind)) / power if power > 0.0 else 0.0
+        ahead, behind = forward[k + 1 :], backward[: len(forward) - k - 1]
+        power = _product(ahead, ahead) + _product(behind, behind)
+        r = 2.0 * _product(ahead, behind) / power if power > 0.0 else 0.0
         reflection[k], left[k + 1] = r, left[k] * max(1.0 - r * r, 1e-12)
-        forward, backward = ahead - r * behind, behind - r * ahead
+        # In place: the rows of a long log would be allocated anew at every order.
+        of_ahead, of_behind = one[: len(ahead)], two[: len(ahead)]
+        np.multiply(ahead, r, out=of_ahead)
+        np.multiply(behind, r, out=of_behind)
+        ahead -= of_behind
+        behind -= of_ahead
     return reflection, left
+
+
+def _product(one: Array, other: Array) -> float:
+    """Sum of products, without BLAS, whose threads would wait for each other longer than it takes."""
+    return float(np.einsum("ij,ij->", one, other))
 
 
 def chosen_reflection(series: Array, *, sparing: bool = False) -> tuple[Array, float]:
@@ -68,8 +82,17 @@ def autocorrelation_of(reflection: Array, n: int) -> Array:
         a[:k] -= r * a[:k][::-1].copy()
         a[k] = r
         error *= 1.0 - r * r
-    if p and n > p + 1:
-        model = np.append(1.0, -a)
+    model = np.append(1.0, -a)
+    end = min(n, p + 1 + _memory(model))
+    if end > p + 1:
         state = lfiltic([1.0], model, rho[p:0:-1])
-        rho[p + 1 :] = lfilter([1.0], model, np.zeros(n - p - 1), zi=state)[0]
+        rho[p + 1 : end] = lfilter([1.0], model, np.zeros(end - p - 1), zi=state)[0]
     return rho
+
+
+def _memory(model: Array) -> int:
+    """Lags after which nothing is left; to decay on through denormal numbers would take long."""
+    slowest = float(np.abs(np.roots(model)).max(initial=0.0))
+    if slowest < _FORGOTTEN:
+        return 0
+    return int(np.log(_FORGOTTEN) / np.log(slowest)) + 1 if slowest < 1.0 else np.iinfo(int).max
