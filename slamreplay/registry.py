@@ -1,4 +1,4 @@
-"""Named things that are loaded when asked for: estimators, perturbations, decoders, checks."""
+"""Named things that are loaded when asked for: estimators, perturbations, checks, labs."""
 
 from __future__ import annotations
 

@@ -13,7 +13,7 @@ from slamreplay.errors import UsageError
 if TYPE_CHECKING:
     from slamreplay.registry import Registry
 
-KINDS = ("estimators", "perturbations", "checks", "decoders", "scenarios", "findings")
+KINDS = ("estimators", "perturbations", "checks", "decoders", "scenarios", "findings", "labs")
 
 
 def register(app: typer.Typer) -> None:
@@ -91,6 +91,10 @@ def _registry(kind: str) -> Registry:
         from slamreplay.consistency import CHECKS
 
         return CHECKS
+    if kind == "labs":
+        from slamreplay.labs import LABS
+
+        return LABS
     from slamreplay.ingest import DECODERS
 
     return DECODERS

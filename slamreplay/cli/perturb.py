@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from slamreplay.cli import options
+from slamreplay.errors import UsageError
 
 if TYPE_CHECKING:
     from slamreplay.replay.metrics import Metrics
@@ -25,7 +26,23 @@ Perturbations = Annotated[
         help="One change, e.g. tf_delay=0.2; several by repeating it, each run by itself.",
     ),
 ]
+Logs = Annotated[
+    list[Path] | None,
+    typer.Argument(
+        metavar="LOG",
+        help="Log or bundle, as of the other commands; none with a recipe that is a lab.",
+        show_default=False,
+    ),
+]
+Recipe = Annotated[
+    Path | None,
+    typer.Option("--recipe", metavar="YAML", help="A question as a file, as in recipes/."),
+]
 Output = Annotated[Path, typer.Option("-o", "--output", metavar="RUNS", help="Folder to write.")]
+Seed = Annotated[
+    int | None,
+    typer.Option("--seed", help="Seed of every random number; 0, or the recipe's own."),
+]
 
 _COLUMNS = (
     ("median [m]", "baseline_median_m"),
@@ -42,11 +59,12 @@ def register(app: typer.Typer) -> None:
 
 
 def perturb(
-    logs: options.Logs,
     output: Output,
+    logs: Logs = None,
+    recipe: Recipe = None,
     perturbations: Perturbations = None,
     estimators: Estimators = None,
-    seed: options.Seed = 0,
+    seed: Seed = None,
     map_yaml: options.MapYaml = None,
     topics: options.Topics = None,
     robot: options.Robot = None,
@@ -57,8 +75,28 @@ def perturb(
 ) -> None:
     """Run estimators on a log: each by itself, then with one perturbation at a time.
 
-    The table shows how far each run is from the undisturbed run of the same estimator.
+    The table shows how far each run is from the undisturbed run of the same estimator. A recipe
+    that is a lab simulates what it needs, takes no LOG and writes its answer to the folder.
     """
+    if recipe is not None:
+        from slamreplay.cli.lab import run_lab
+
+        only_logs = {
+            "LOG": logs,
+            "--perturbation": perturbations,
+            "--estimator": estimators,
+            "--map": map_yaml,
+            "--topics": topics,
+            "--robot": robot,
+            "--reference": reference,
+            "--start": start_s,
+            "--end": end_s,
+        }
+        given = [name for name, value in only_logs.items() if value not in (None, [])]
+        run_lab(recipe, output, seed=seed, given=given, as_json=as_json)
+        return
+    if not logs:
+        raise UsageError("there is no LOG to replay", hint="name one, or a lab with --recipe")
     from slamreplay.bundle.atomic import check_target
     from slamreplay.cli.main import cache_folder
     from slamreplay.cli.progress import progress_bar
@@ -82,7 +120,7 @@ def perturb(
         end_s=end_s,
     )
     with options.evidence(logs, how) as bundle:
-        trials = design(bundle, estimators or list(ESTIMATORS), perturbations or (), seed)
+        trials = design(bundle, estimators or list(ESTIMATORS), perturbations or (), seed or 0)
         with progress_bar("replaying") as progress:
             runs = replay(bundle, trials, progress=progress, cache=cache_folder() / "runs")
         is_raw = bundle.path is None or bundle.path.resolve() != logs[0].resolve()

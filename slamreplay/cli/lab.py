@@ -1,0 +1,72 @@
+"""What `slamreplay perturb` does with a recipe that is a laboratory: run, write, print."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import typer
+
+from slamreplay.errors import UsageError
+
+if TYPE_CHECKING:
+    from slamreplay.labs.lab import ResultTable
+
+
+def run_lab(
+    path: Path, output: Path, *, seed: int | None, given: Sequence[str], as_json: bool
+) -> None:
+    """Answer a recipe's question.
+
+    Args:
+        path: the recipe.
+        output: folder to write.
+        seed: in place of the recipe's own.
+        given: names of arguments and options of the command line that only a log can take.
+        as_json: print the results as JSON.
+
+    Raises:
+        UsageError: a recipe that cannot be read, or a log given to a lab.
+    """
+    from slamreplay.cli.progress import progress_bar
+    from slamreplay.labs.folder import check_results_target, results_json, write_results
+    from slamreplay.recipes import read_recipe
+
+    recipe = read_recipe(path)
+    if given:
+        raise UsageError(
+            f"the lab {recipe.lab} simulates what it needs: it takes no {', '.join(given)}",
+            where=path,
+            hint="leave it out",
+        )
+    if seed is not None and seed < 0:
+        raise UsageError(f"seed {seed} is negative")
+    seed = recipe.seed if seed is None else seed
+    check_results_target(output)
+    with progress_bar("simulating") as progress:
+        results = recipe.parameters.run(seed, progress)
+    head = {
+        "question": recipe.question,
+        "lab": recipe.lab,
+        "seed": seed,
+        "parameters": recipe.parameters.model_dump(mode="json"),
+    }
+    write_results(output, head, results)
+    if as_json:
+        typer.echo(results_json(head, results), nl=False)
+        return
+    typer.echo(recipe.question)
+    for table in results.tables:
+        typer.echo(f"\n{table.title}\n{_text(table)}")
+    typer.echo(f"\nresults written to {output}", err=True)
+
+
+def _text(table: ResultTable) -> str:
+    columns = [k for k, name in enumerate(table.head) if name in (table.brief or table.head)]
+    lines = [[row[k] for k in columns] for row in (table.head, *table.rows)]
+    widths = [max(len(line[k]) for line in lines) for k in range(len(columns))]
+    return "\n".join(
+        "  ".join(f"{cell:<{width}}" for cell, width in zip(line, widths, strict=True)).rstrip()
+        for line in lines
+    )

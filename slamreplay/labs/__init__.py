@@ -1,0 +1,14 @@
+"""Laboratories: questions about estimators that a simulation answers, with no log at hand.
+
+A lab is one file or folder here (a model whose fields are what a recipe sets, and `run`), one line
+below, one figure in `slamreplay.report.figures` and one folder under `recipes/`.
+"""
+
+from slamreplay.registry import Registry
+
+LABS = Registry(
+    "lab",
+    {
+        "covariance_breathing": "slamreplay.labs.covariance_breathing.lab:CovarianceBreathing",
+    },
+)

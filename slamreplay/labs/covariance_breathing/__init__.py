@@ -1,0 +1,1 @@
+"""How the covariance of a pose breathes along a corridor, and how it collapses."""
