@@ -6,9 +6,12 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from PIL import Image
 
 from slamreplay.errors import UsageError
@@ -265,3 +268,34 @@ def test_numbers_are_read_as_people_write_them(tmp_path):
 
     assert recipe.parameters.range_sigma_m == 0.1
     assert recipe.seed == 10  # not eight: YAML 1.2
+
+
+@settings(max_examples=150, deadline=None)
+@given(
+    st.lists(
+        st.tuples(
+            st.integers(0, len(SMALL)),
+            st.integers(0, 12),
+            st.sampled_from(
+                ["", " ", "\n", "-", "0", "9" * 400, "1e400", "&a ", "*a", "!!set ", "{", "[",
+                 "]", "}", ": ", "'", '"', "%", "\t", "\\", "null", "~", ".nan", "\u2028", "\x07"]
+            ),
+        ),
+        min_size=1,
+        max_size=4,
+    )
+)  # fmt: skip
+def test_a_damaged_recipe_is_read_or_refused_in_one_line(edits):
+    text = SMALL
+    for at, length, put in edits:
+        text = text[:at] + put + text[at + length :]
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "recipe.yaml"
+        path.write_text(text, encoding="utf-8")
+        said = ""
+        try:
+            read_recipe(path)
+        except UsageError as error:
+            said = str(error)
+        assert said.isprintable()
+        assert len(said) < 500

@@ -29,7 +29,7 @@ Perturbations = Annotated[
 Logs = Annotated[
     list[Path] | None,
     typer.Argument(
-        metavar="[LOG...]",
+        metavar="LOG",
         help="Log or bundle, as of the other commands; none with a recipe that is a lab.",
         show_default=False,
     ),
