@@ -13,6 +13,7 @@ from slamreplay.testing import ConformanceError, believed, check_check
 
 #: Of each check about a belief: the finding that names its defect, and a log that has it.
 BELIEF_LINES = {
+    "collapse": ("SR-CON-010", partial(believed, collapsed=0.1)),
     "nees": ("SR-CON-001", partial(believed, rows=3000, told=0.5)),
 }
 

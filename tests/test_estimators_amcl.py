@@ -5,6 +5,7 @@ import pytest
 
 from slamreplay.errors import MapError, UsageError
 from slamreplay.estimators.amcl import kernels
+from slamreplay.estimators.amcl.cloud import moments
 from slamreplay.estimators.amcl.config import AmclConfig
 from slamreplay.estimators.amcl.filter import AmclFilter
 from slamreplay.geometry import se2
@@ -127,6 +128,24 @@ def test_clusters_join_touching_cells_and_headings_across_pi():
 
     assert labels[0] == labels[1]
     assert len(set(labels[1:].tolist())) == 3
+
+
+def test_two_heaps_are_two_clusters_and_a_stray_particle_is_none():
+    amcl = AmclFilter(AmclConfig(min_particles=100, max_particles=1000), ROOM, 3)
+    amcl.initialise(in_room(2.0, 1.5, 0.1), np.diag([0.01, 0.01, 0.001]))
+    one = amcl.clusters
+    heaps = amcl.particles.copy()
+    heaps[:400, 0] += 4.0
+    heaps[-1, 0] -= 4.0
+    amcl._adopt(heaps, amcl.weights)
+    rows = np.s_[400:-1]
+
+    assert (one, amcl.clusters) == (1, 2)
+    np.testing.assert_allclose(amcl.mean_xyyaw[:2], heaps[rows, :2].mean(axis=0), atol=1e-9)
+    own = moments(heaps, amcl.weights)
+    np.testing.assert_allclose(own.cov, amcl.cov)
+    np.testing.assert_allclose(own.cov[:2, :2], np.cov(heaps[:, :2].T, bias=True))
+    assert own.cov[0, 0] > 3.0 > 100 * moments(heaps[rows], amcl.weights[rows]).cov[0, 0]
 
 
 def test_filter_tracks_from_a_start_half_a_metre_off():

@@ -38,6 +38,7 @@ def test_amcl_follows_the_robot_and_dead_reckoning_drifts_from_it():
     assert np.hypot(*error(dead.track)[-1, :2]) > 0.15
     assert 0.1 < np.mean(amcl.diagnostics["updated"]) < 0.4
     assert (amcl.diagnostics["particles"] >= 500).all()
+    assert (amcl.diagnostics["clusters"][50:] == 1).all()
 
 
 def test_dead_reckoning_covers_its_own_error():
@@ -81,6 +82,7 @@ def test_amcl_without_any_start_localizes_globally():
     estimate = Amcl().run(NO_START.view(), seed=1)
 
     assert np.sqrt(estimate.track.cov[0, 0, 0]) > 2.0
+    assert np.isfinite(estimate.diagnostics["clusters"]).all()
     assert estimate.track.frame_id == "map"
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from slamreplay.bundle.tables import Table
 from slamreplay.geometry import se2, se3
-from slamreplay.geometry.covariance import is_positive_definite
+from slamreplay.geometry.covariance import is_positive_definite, is_symmetric
 
 #: Variances beyond these say "not measured": 0.03 mm, 300 m; a heading that may be any, and a rate.
 LEAST, MOST, MOST_RAD2 = 1e-9, 1e5, 100.0
@@ -21,7 +21,7 @@ FEWEST = 10
 GROWN_M, GROWN = 5.0, 1.05
 
 NOT_FINITE, ALL_ZERO = "not finite", "all zero"
-INDEFINITE = "not symmetric and positive definite"
+ASYMMETRIC, INDEFINITE = "not symmetric", "not positive definite"
 CONSTANT = "one and the same although the robot moved"
 NO_GROWTH = "never larger however far the robot went"
 OUT_OF_BOUNDS = "out of all bounds in an axis"
@@ -96,7 +96,8 @@ def judge_covariances(cov: se2.Array, axes: tuple[int, ...], moved: Moved | None
         bad_axis = (tiny & (variance >= 0.0)) | (variance >= most)
     infinite = told & ~np.isfinite(block).all(axis=(1, 2))
     bad_axis |= ~np.isfinite(variance)
-    odd = told & ~zero & ~marked & ~_semidefinite(block, bad_axis)
+    asymmetric, indefinite = _odd(block, bad_axis)
+    usual = told & ~zero & ~marked
     given = block[told & ~zero]
     same = len(given) >= FEWEST and bool((given == given[:1]).all())
     constant = np.broadcast_to(moved is not None and moved.at_all and same, n)
@@ -105,13 +106,15 @@ def judge_covariances(cov: se2.Array, axes: tuple[int, ...], moved: Moved | None
         NOT_GIVEN: marked,
         NOT_FINITE: infinite & ~marked,
         ALL_ZERO: zero,
-        INDEFINITE: odd,
+        ASYMMETRIC: usual & asymmetric,
+        INDEFINITE: usual & indefinite,
         CONSTANT: told & constant & ~zero & ~marked,
         NO_GROWTH: told & stuck & ~zero & ~marked,
     }
     rest = told & ~np.logical_or.reduce(list(faults.values()))
     faults[OUT_OF_BOUNDS] = rest & bad_axis.any(axis=1)
     values = cov.copy()
+    odd = usual & (asymmetric | indefinite)
     whole = marked | zero | odd | faults[CONSTANT] | faults[NO_GROWTH]
     values[whole] = np.nan
     for place, axis in enumerate(axes):
@@ -121,8 +124,10 @@ def judge_covariances(cov: se2.Array, axes: tuple[int, ...], moved: Moved | None
     return Judged(values.reshape(n, size * size), faults)
 
 
-def _semidefinite(block: se2.Array, bad_axis: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """(N,) symmetric without a negative eigenvalue in the axes that are not bad anyway."""
+def _odd(
+    block: se2.Array, bad_axis: NDArray[np.bool_]
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """(N,) not symmetric, and (N,) symmetric with a negative eigenvalue, in axes not bad anyway."""
     keep = ~bad_axis
     inside = np.where(keep[:, :, None] & keep[:, None, :], block, 0.0)
     finite = np.isfinite(inside).all(axis=(1, 2))
@@ -131,11 +136,12 @@ def _semidefinite(block: se2.Array, bad_axis: NDArray[np.bool_]) -> NDArray[np.b
     # A hair is added to the diagonal: a variance of zero is no measurement, but no contradiction.
     lifted = inside + (1e-9 * scale)[:, None, None] * np.eye(block.shape[1])
     if not len(lifted):
-        return np.zeros(0, dtype=np.bool_)
+        return np.zeros(0, dtype=np.bool_), np.zeros(0, dtype=np.bool_)
     # Sensors repeat theirs: each run of equal ones is looked at once.
     first = np.append(True, (lifted[1:] != lifted[:-1]).any(axis=(1, 2)))
-    sound = is_positive_definite(lifted[first])[np.cumsum(first) - 1]
-    return np.asarray(finite & sound, dtype=np.bool_)
+    run = np.cumsum(first) - 1
+    even, sound = is_symmetric(lifted[first])[run], is_positive_definite(lifted[first])[run]
+    return finite & ~even, ~finite | (even & ~sound)
 
 
 def _never_grows(variance: se2.Array, moved: Moved) -> bool:

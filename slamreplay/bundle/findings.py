@@ -144,6 +144,22 @@ FINDINGS: dict[str, Explanation] = {
         "samples (n over the integrated autocorrelation time of the NEES series).",
         "Undecided is neither consistent nor inconsistent.",
     ),
+    "SR-CON-010": Explanation(
+        "The covariance collapsed",
+        "From when on did sigma shrink or stand while the error grew, or shrink for no reason?",
+        "Errors of position and of heading against each independent source (else the best of those "
+        "that share evidence), whitened: windows of 4, 8, 16 ... updates whose mean square is held "
+        "against chi-square of their independent samples; p times the windows looked at "
+        "(Bonferroni scan, Walther 2022, arXiv:2107.08296). Onset and end by the largest sum of "
+        "log-likelihood ratios (Page 1954, Biometrika 41). A belief that is too sure of itself all "
+        "the time is SR-CON-001's. Facts: sigma smaller by a quarter although nothing was sensed "
+        "or taken in; sigma below r / sqrt(12 N) of N beams in a map of cells r (the bound of "
+        "Censi 2007, On achievable accuracy for range-finder localization). One finding for all "
+        "that overlap; its value is the factor by which sigma was too small, or shrank.",
+        "A reference that jumps makes any belief look too sure of itself. What shares evidence "
+        "with the belief proves nothing where it is silent. A localizer may have used sensors "
+        "that are not in the log. The floor takes the map's cells as all that is known of walls.",
+    ),
     "SR-REF-001": Explanation(
         "What the robot sensed joined hindsight",
         "Which tags, docks and satellite fixes are part of the rebuilt trajectory?",

@@ -6,6 +6,7 @@ CHECKS = Registry(
     "check",
     {
         "clock": "slamreplay.consistency.clock:check",
+        "collapse": "slamreplay.consistency.collapse.check:check",
         "covariance": "slamreplay.consistency.validity:check",
         "lasers": "slamreplay.consistency.lasers:check",
         "losses": "slamreplay.consistency.completeness:check_losses",
@@ -32,4 +33,4 @@ AUDITS = (
 )
 
 #: The checks that concern a belief, whoever holds it: runs of estimators are asked them too.
-ABOUT_BELIEF = frozenset({"nees"})
+ABOUT_BELIEF = frozenset({"collapse", "nees"})

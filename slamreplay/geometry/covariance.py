@@ -87,15 +87,21 @@ def turned(covariance: ArrayLike, yaw: ArrayLike) -> Array:
     return turn @ np.asarray(covariance, dtype=np.float64) @ np.swapaxes(turn, -1, -2)
 
 
+def is_symmetric(covariance: ArrayLike) -> NDArray[np.bool_]:
+    """Which of the matrices (..., n, n) are finite and symmetric, but for rounding, as a mask."""
+    cov = np.asarray(covariance, dtype=np.float64)
+    finite = np.asarray(np.isfinite(cov).all(axis=(-2, -1)))
+    inside = np.where(finite[..., None, None], cov, 0.0)  # an infinity minus itself would warn
+    scale = np.abs(inside).max(axis=(-2, -1), initial=0.0)
+    skew = np.abs(inside - np.swapaxes(inside, -2, -1)).max(axis=(-2, -1), initial=0.0)
+    return np.asarray(finite & (skew <= 1e-9 * scale))
+
+
 def is_positive_definite(covariance: ArrayLike) -> NDArray[np.bool_]:
     """Which of the matrices (..., n, n) are finite, symmetric and positive definite, as a mask."""
     cov = np.asarray(covariance, dtype=np.float64)
     flat = cov.reshape((-1, *cov.shape[-2:]))
-    sound = np.asarray(np.isfinite(flat).all(axis=(1, 2)))
-    inside = np.where(sound[:, None, None], flat, 0.0)  # an infinity minus itself would warn
-    scale = np.abs(inside).max(axis=(1, 2), initial=0.0)
-    skew = np.abs(inside - np.swapaxes(inside, 1, 2))
-    sound &= skew.max(axis=(1, 2), initial=0.0) <= 1e-9 * scale
+    sound = is_symmetric(flat)
     sound[sound] = np.linalg.eigvalsh(flat[sound])[:, 0] > 0.0
     return sound.reshape(cov.shape[:-2])
 

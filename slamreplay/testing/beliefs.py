@@ -24,7 +24,13 @@ _S = np.array([[0.01, 0.002], [0.002, 0.0025]])
 
 
 def believed(
-    seed: int, *, rows: int = 600, told: float = 1.0, wild: float = 0.0, bias: float = 0.0
+    seed: int,
+    *,
+    rows: int = 600,
+    told: float = 1.0,
+    wild: float = 0.0,
+    bias: float = 0.0,
+    collapsed: float = 1.0,
 ) -> CheckContext:
     """A belief published at 5 Hz, its reference, and the innovations of one sensor.
 
@@ -39,6 +45,7 @@ def believed(
         wild: share of rows (and of innovations) whose error is five times as large; the others are
             smaller by so much that the covariance is right on average.
         bias: of the innovations, in their sigmas.
+        collapsed: sigma as it is claimed over `told`, in the third quarter of the rows.
     """
     rng = np.random.Generator(np.random.PCG64(seed))
     t_ns = np.arange(rows) * (NS_PER_S // 5)
@@ -48,7 +55,9 @@ def believed(
     white = _remembering(rng, rows, MEMORIES[seed % len(MEMORIES)]) * _heights(rng, rows, wild)
     belief = truth + np.einsum("nij,nj->ni", np.linalg.cholesky(cov), white)
     belief[:, 2] = se2.wrap_angle(belief[:, 2])
-    track = PoseTrack("map", "base", t_ns, belief, cov * told**2)
+    claimed = np.full(rows, told)
+    claimed[rows // 2 : rows * 3 // 4] *= collapsed
+    track = PoseTrack("map", "base", t_ns, belief, cov * claimed[:, None, None] ** 2)
     reference = PoseTrack.without_covariance("map", "base", t_ns, truth)
     bundle = _bundle(track)
     seen = rng.standard_normal((rows, 2)) * _heights(rng, rows, wild) + bias

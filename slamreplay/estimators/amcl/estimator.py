@@ -17,6 +17,8 @@ from slamreplay.estimators.inputs import need_grid, need_odometry, need_scans
 from slamreplay.estimators.start import DEFAULT_COV, GLOBAL, OFFSET, ROTATE, Start, starts
 from slamreplay.geometry import se2
 
+_DIAGNOSTICS = ("updated", "particles", "ess", "clusters")
+
 
 @dataclass(frozen=True)
 class Amcl:
@@ -39,8 +41,9 @@ class Amcl:
     def run(self, view: BundleView, *, seed: int) -> Estimate:
         """One row per scan; NaN before the start and where the scan has no odometry.
 
-        Diagnostics: `updated` (1 where the filter took the scan in), `particles`, and `ess`, the
-        effective sample size before the latest resampling.
+        Diagnostics: `updated` (1 where the filter took the scan in), `particles`, `ess`, the
+        effective sample size before the latest resampling, and `clusters`, how many carry a tenth
+        of the weight or more: the mean is the heaviest one's, the covariance that of all.
 
         Raises:
             NotApplicableError: no odometry, scans or map.
@@ -57,8 +60,8 @@ class Amcl:
 
         n = len(scans)
         xyyaw, cov = np.full((n, 3), np.nan), np.full((n, 3, 3), np.nan)
-        diagnostics = {name: np.full(n, np.nan) for name in ("updated", "particles", "ess")}
-        T_map_odom, published = np.zeros(3), np.zeros((3, 3))
+        diagnostics = {name: np.full(n, np.nan) for name in _DIAGNOSTICS}
+        T_map_odom, published, clusters = np.zeros(3), np.zeros((3, 3)), 0
         first = min(given, default=n)
         for row in known[known >= first].tolist():
             if row in given:
@@ -66,12 +69,13 @@ class Amcl:
             updated = _update(amcl, scans, row, T_odom_base[row])
             if updated:
                 T_map_odom = se2.compose(amcl.mean_xyyaw, se2.inverse(T_odom_base[row]))
-                published = amcl.cov
+                published, clusters = amcl.cov, amcl.clusters
             xyyaw[row] = se2.compose(T_map_odom, T_odom_base[row])
             cov[row] = published
             diagnostics["updated"][row] = float(updated)
             diagnostics["particles"][row] = float(len(amcl.particles))
             diagnostics["ess"][row] = amcl.ess
+            diagnostics["clusters"][row] = float(clusters)
         frames = view.manifest.frames
         track = PoseTrack(
             frames.map or grid.frame_id, frames.base or "base_link", scans.t_ns, xyyaw, cov

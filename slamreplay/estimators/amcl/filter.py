@@ -7,14 +7,18 @@ from numpy.typing import ArrayLike, NDArray
 
 from slamreplay.errors import MapError
 from slamreplay.estimators.amcl import kernels
+from slamreplay.estimators.amcl.cloud import (
+    LEAST_RESULTANT,
+    SHARE,
+    circular_moments,
+    cluster_of,
+    histogram,
+)
 from slamreplay.estimators.amcl.config import AmclConfig
 from slamreplay.estimators.start import DEFAULT_COV
 from slamreplay.geometry import se2
 from slamreplay.maps.grid import OccupancyGrid
 from slamreplay.maps.likelihood_field import distance_field
-
-#: Resultant length of a cloud of headings that point everywhere; keeps -2 ln R finite.
-_LEAST_RESULTANT = 1e-12
 
 
 class AmclFilter:
@@ -56,12 +60,15 @@ class AmclFilter:
     @property
     def mean_xyyaw(self) -> se2.Array:
         """(3,) weighted mean of the heaviest cluster, as nav2_amcl publishes it."""
-        distinct, bins = _histogram(self._particles)
-        label = kernels.cluster_labels(distinct)[bins]
-        heaviest = np.argmax(np.bincount(label, self._weights))
-        rows = label == heaviest
-        mean, _ = _circular_moments(self._particles[rows], self._weights[rows])
+        label = cluster_of(self._particles)
+        rows = label == np.argmax(np.bincount(label, self._weights))
+        mean, _ = circular_moments(self._particles[rows], self._weights[rows])
         return mean
+
+    @property
+    def clusters(self) -> int:
+        """How many clusters carry a tenth of the weight or more: with two, mean and cov part."""
+        return int((np.bincount(cluster_of(self._particles), self._weights) >= SHARE).sum())
 
     @property
     def cov(self) -> se2.Array:
@@ -70,12 +77,12 @@ class AmclFilter:
         Only xx, xy, yy and yaw-yaw are filled; the latter is circular: -2 ln R, R the length of
         the mean heading vector.
         """
-        mean, resultant = _circular_moments(self._particles, self._weights)
+        mean, resultant = circular_moments(self._particles, self._weights)
         off = self._particles[:, :2] - mean[:2]
         cov = np.zeros((3, 3))
         cov[:2, :2] = (off * self._weights[:, None]).T @ off
         cov[1, 0] = cov[0, 1]
-        cov[2, 2] = -2.0 * np.log(np.clip(resultant, _LEAST_RESULTANT, 1.0))
+        cov[2, 2] = -2.0 * np.log(np.clip(resultant, LEAST_RESULTANT, 1.0))
         return cov
 
     @property
@@ -225,7 +232,7 @@ class AmclFilter:
             self._slow = self._fast = 0.0
         start_size, start_draw = self._rng.random(2)
         cumulative = np.cumsum(weights)
-        distinct, bins = _histogram(particles)
+        distinct, bins = histogram(particles)
         n = kernels.kld_size(
             bins,
             len(distinct),
@@ -267,17 +274,3 @@ def _delta(before: se2.Array, after: ArrayLike) -> se2.Array:
     delta = np.asarray(after, dtype=np.float64) - before
     delta[2] = se2.wrap_angle(delta[2])
     return delta
-
-
-def _histogram(particles: se2.Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """The distinct cells of the cloud, sorted, and (N,) which of them each particle is in."""
-    cells = kernels.cell_numbers(particles, particles[:, :2].min(axis=0))
-    return np.unique(cells, return_inverse=True)
-
-
-def _circular_moments(particles: se2.Array, weights: se2.Array) -> tuple[se2.Array, float]:
-    """Weighted mean pose (3,) and resultant length of the headings, of weights that sum to any."""
-    share = weights / weights.sum()
-    x, y = share @ particles[:, 0], share @ particles[:, 1]
-    cos, sin = share @ np.cos(particles[:, 2]), share @ np.sin(particles[:, 2])
-    return np.array([x, y, np.arctan2(sin, cos)]), float(np.hypot(cos, sin))
