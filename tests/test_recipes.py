@@ -29,7 +29,7 @@ def run(*arguments, **env):
         [PROGRAM, *map(str, arguments)],
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=600,
         env=os.environ | env,
     )
 

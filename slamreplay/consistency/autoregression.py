@@ -41,7 +41,7 @@ def burg(series: Array, order: int) -> tuple[Array, Array]:
 
 
 def _product(one: Array, other: Array) -> float:
-    """Sum of products, without BLAS, whose threads would wait for each other longer than it takes."""
+    """Sum of products, without BLAS: its threads take longer to meet than the sum does."""
     return float(np.einsum("ij,ij->", one, other))
 
 

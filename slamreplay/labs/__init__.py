@@ -10,5 +10,6 @@ LABS = Registry(
     "lab",
     {
         "covariance_breathing": "slamreplay.labs.covariance_breathing.lab:CovarianceBreathing",
+        "interval_calibration": "slamreplay.labs.interval_calibration.lab:IntervalCalibration",
     },
 )

@@ -1,0 +1,1 @@
+"""How often the intervals of mean NEES cry wolf, and what they find."""
