@@ -127,6 +127,20 @@ def test_burg_finds_the_model_and_its_autocorrelation():
     assert (np.linalg.eigvalsh(toeplitz(rho)) > 0).all()
 
 
+@pytest.mark.parametrize(("n", "m", "order"), [(200, 3, 12), (7, 2, 6), (2, 1, 1), (40, 1, 10)])
+def test_compiled_lattice_is_the_plain_one(n, m, order):
+    series = np.cumsum(np.random.default_rng(n).standard_normal((n, m)), axis=0)
+    ahead = behind = series
+    plain = []
+    for _ in range(order):
+        ahead, behind = ahead[1:], behind[:-1]
+        r = 2 * np.sum(ahead * behind) / np.sum(ahead**2 + behind**2)
+        plain.append(r)
+        ahead, behind = ahead - r * behind, behind - r * ahead
+
+    np.testing.assert_allclose(burg(series, order)[0], plain, rtol=1e-9)
+
+
 def test_the_bias_of_the_first_coefficient_is_mended():
     raw, mended = [], []
     for seed in range(400):

@@ -22,27 +22,12 @@ def burg(series: Array, order: int) -> tuple[Array, Array]:
     summed over the columns, m realisations of one process of zero mean. Nothing is subtracted: a
     consistent error has no mean, and an estimated one would make short series look whiter.
     """
-    forward = np.array(series, dtype=np.float64)
-    backward = forward.copy()
-    one, two = np.empty_like(forward), np.empty_like(forward)
-    reflection, left = np.zeros(order), np.ones(order + 1)
-    for k in range(order):
-        ahead, behind = forward[k + 1 :], backward[: len(forward) - k - 1]
-        power = _product(ahead, ahead) + _product(behind, behind)
-        r = 2.0 * _product(ahead, behind) / power if power > 0.0 else 0.0
-        reflection[k], left[k + 1] = r, left[k] * max(1.0 - r * r, 1e-12)
-        # In place: the rows of a long log would be allocated anew at every order.
-        of_ahead, of_behind = one[: len(ahead)], two[: len(ahead)]
-        np.multiply(ahead, r, out=of_ahead)
-        np.multiply(behind, r, out=of_behind)
-        ahead -= of_behind
-        behind -= of_ahead
+    from slamreplay.consistency.lattice import reflections  # numba takes a moment to load
+
+    rows = np.ascontiguousarray(series, dtype=np.float64)
+    reflection = np.asarray(reflections(rows, order))
+    left = np.append(1.0, np.cumprod(np.maximum(1.0 - reflection**2, 1e-12)))
     return reflection, left
-
-
-def _product(one: Array, other: Array) -> float:
-    """Sum of products, without BLAS: its threads take longer to meet than the sum does."""
-    return float(np.einsum("ij,ij->", one, other))
 
 
 def chosen_reflection(series: Array, *, sparing: bool = False) -> tuple[Array, float]:
