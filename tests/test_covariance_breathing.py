@@ -6,9 +6,7 @@ import numpy as np
 import pytest
 import yaml
 from pydantic import ValidationError
-from scipy.stats import chi2
 
-from slamreplay.labs.covariance_breathing.cases import mean_interval
 from slamreplay.labs.covariance_breathing.corridor import Corridor, drive
 from slamreplay.labs.covariance_breathing.lab import CovarianceBreathing
 
@@ -106,13 +104,6 @@ def test_a_noise_told_too_small_keeps_sigma_tiny_while_the_error_grows():
 def recipe_parameters(**changes):
     folder = Path(__file__).resolve().parents[1] / "recipes" / "covariance-breathing"
     return yaml.safe_load((folder / "recipe.yaml").read_text())["parameters"] | changes
-
-
-def test_interval_of_the_mean_is_that_of_scipy_stats():
-    low, high = mean_interval(1000, 0.001)
-
-    assert low == pytest.approx(chi2.ppf(0.0005, 2000) / 1000)
-    assert high == pytest.approx(chi2.isf(0.0005, 2000) / 1000)
 
 
 def test_words_follow_the_rules():

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.special import chdtri
 
+from slamreplay.consistency.intervals import mean_interval
 from slamreplay.geometry.se2 import Array
 from slamreplay.labs.covariance_breathing.corridor import Chain, Drive, Wall
 from slamreplay.labs.covariance_breathing.rules import Rules
@@ -131,7 +131,7 @@ def summarise(
     spread, held = (np.trace(c.P, axis1=1, axis2=2) for c in (driven.smoothed, driven.closed))
     leaves = math.sqrt(held[-1] / spread[-1])
     leaves_chain = math.sqrt(held.mean() / spread.mean())
-    interval = mean_interval(len(driven.closure_nis), rules.interval_miss_probability)
+    interval = mean_interval(DOF, len(driven.closure_nis), rules.interval_miss_probability)
     snaps = leaves <= rules.tight_to_ratio and leaves_chain <= rules.tight_to_chain_ratio
     words = {
         name: "grows without bound" if ratio >= rules.grows_from_ratio else "stays bounded"
@@ -143,16 +143,6 @@ def summarise(
         every_steps, walls, told, true, before, after, float(driven.closure_nis.mean()), growth,
         leaves, leaves_chain, interval, words,
     )  # fmt: skip
-
-
-def mean_interval(runs: int, p: float) -> tuple[float, float]:
-    """Two-sided interval of the mean NEES of independent runs, missed with probability `p`.
-
-    The sum of n independent chi-square values of `DOF` degrees of freedom is chi-square of n * DOF
-    (Bar-Shalom, Li, Kirubarajan 2001, section 5.4.2).
-    """
-    low, high = chdtri(DOF * runs, 1.0 - p / 2.0), chdtri(DOF * runs, p / 2.0)
-    return float(low) / runs, float(high) / runs
 
 
 def _chained(chain: Chain, typical: int) -> Chained:
