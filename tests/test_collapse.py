@@ -236,6 +236,19 @@ def test_hindsight_alone_warns_and_says_what_it_is_worth():
     assert "hindsight" not in told(ask([both], ["collapse"]))[0].message
 
 
+def test_what_shares_evidence_accuses_nobody_whom_an_independent_source_clears():
+    t = times()
+    sigma = breathing(len(t))
+    sound = context(t, ar1(np.random.default_rng(1), len(t), 0.5) * sigma, sigma)
+    truth = sound.references[0].track
+    astray = truth.xyyaw + np.where((truth.t_ns - START_NS > 50 * SECOND)[:, None], [2, 0, 0], 0)
+    jumped = PoseTrack.without_covariance("map", "base_link", truth.t_ns, astray)
+    wrong = Reference("hindsight", "hindsight", jumped)
+
+    assert told(ask([replace(sound, references=(wrong,))], ["collapse"]))
+    assert told(ask([replace(sound, references=(*sound.references, wrong))], ["collapse"])) == []
+
+
 def test_without_a_reference_nothing_is_tested():
     t = times()
     assert check(context(t, np.zeros((len(t), 3)), breathing(len(t)), kind=None)) == ()
@@ -328,9 +341,12 @@ def test_sigma_below_what_a_scan_can_tell():
 
 def test_a_map_that_is_being_made_begins_with_a_pose_that_is_known():
     t = times()
-    grows = np.clip(t, 2e-3, None)[:, None] * np.array([0.01, 0.01, 0.004])
+    grows = np.interp(t, [0.0, 60.0], [2e-4, 0.02])[:, None] * np.array([1.0, 1.0, 0.5])
+    zero = np.zeros((len(t), 3))
 
-    assert check(context(t, np.zeros((len(t), 3)), grows, kind=None)) == ()
+    assert check(context(t, zero, grows, kind=None)) == ()
+    (finding,) = check(context(t, zero, grows[::-1], kind=None))
+    assert "sigma of the position fell to" in finding.message
 
 
 def test_facts_and_errors_of_one_collapse_are_one_finding():

@@ -1,7 +1,9 @@
 """Every check before the conformance kit: sound logs are left alone, the named defect is found."""
 
+from dataclasses import replace
 from functools import partial
 
+import numpy as np
 import pytest
 from audited import healthy
 
@@ -11,8 +13,18 @@ from slamreplay.consistency.asking import ask
 from slamreplay.consistency.context import CheckContext
 from slamreplay.testing import ConformanceError, believed, check_check
 
+
+def torn(seed):
+    """A replayed particle filter that held two clusters for a third of the log."""
+    sound = believed(seed)
+    clusters = 1.0 + (np.arange(len(sound.belief)) % 9 < 3)
+    diagnostics = {"updated": np.ones(len(clusters)), "clusters": clusters}
+    return replace(sound, subject="amcl", diagnostics=diagnostics)
+
+
 #: Of each check about a belief: the finding that names its defect, and a log that has it.
 BELIEF_LINES = {
+    "belonging": ("SR-CON-011", torn),
     "collapse": ("SR-CON-010", partial(believed, collapsed=0.1)),
     "nees": ("SR-CON-001", partial(believed, rows=3000, told=0.5)),
 }

@@ -160,6 +160,17 @@ FINDINGS: dict[str, Explanation] = {
         "with the belief proves nothing where it is silent. A localizer may have used sensors "
         "that are not in the log. The floor takes the map's cells as all that is known of walls.",
     ),
+    "SR-CON-011": Explanation(
+        "Mean and covariance do not belong together",
+        "Are the published mean and covariance those of the same particles?",
+        "Each update against the nearest cloud within 0.5 s in the same frame: its clusters (cells "
+        "of 0.5 m and 10 deg that touch, as nav2_amcl makes them), mean and covariance of the "
+        "whole and of each cluster with a tenth of the weight, the heading's variance -2 ln R. "
+        "The mean one cluster's and the covariance the whole's, or the other way round: such rows "
+        "are left out of NEES; where they are most, all are. Of a replayed AMCL by its own count.",
+        "A cloud that is merely thin falls into clusters as well; it counts only where the two "
+        "means and the two covariances differ. Without a cloud in the log nothing is seen.",
+    ),
     "SR-REF-001": Explanation(
         "What the robot sensed joined hindsight",
         "Which tags, docks and satellite fixes are part of the rebuilt trajectory?",

@@ -5,6 +5,7 @@ from slamreplay.registry import Registry
 CHECKS = Registry(
     "check",
     {
+        "belonging": "slamreplay.consistency.parted:check",
         "clock": "slamreplay.consistency.clock:check",
         "collapse": "slamreplay.consistency.collapse.check:check",
         "covariance": "slamreplay.consistency.validity:check",
@@ -33,4 +34,4 @@ AUDITS = (
 )
 
 #: The checks that concern a belief, whoever holds it: runs of estimators are asked them too.
-ABOUT_BELIEF = frozenset({"collapse", "nees"})
+ABOUT_BELIEF = frozenset({"belonging", "collapse", "nees"})

@@ -7,10 +7,18 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from types import MappingProxyType
 
+import numpy as np
+from numpy.typing import NDArray
+
 from slamreplay.audit.log_audit import LogAudit
 from slamreplay.bundle.run import Innovations, Run
 from slamreplay.bundle.track import PoseTrack
 from slamreplay.bundle.view import BundleView
+from slamreplay.consistency.belonging import (
+    Belonging,
+    belonging_of_robot,
+    belonging_of_run,
+)
 from slamreplay.consistency.evidence import Evidence, Reference
 from slamreplay.consistency.gathering import evidence_of, updates_of
 from slamreplay.geometry.se2 import Array
@@ -64,7 +72,22 @@ class CheckContext:
         """The updates' errors against each source that can tell, the best first."""
         if self.updates is None:
             return ()
-        return evidence_of(self.updates, self.references)
+        return evidence_of(self.updates, self.references, self.left_out)
+
+    @cached_property
+    def belonging(self) -> Belonging | None:
+        """Whether mean and covariance of the updates are of the same particles; None if unknown."""
+        if self.updates is None:
+            return None
+        if not self.subject:
+            return belonging_of_robot(self.updates, self.view)
+        assert self.belief is not None  # or it would have no updates
+        return belonging_of_run(self.updates, self.belief, self.diagnostics)
+
+    @property
+    def left_out(self) -> NDArray[np.bool_] | None:
+        """(N,) updates that no error is to be held against, None where all may be."""
+        return None if self.belonging is None else self.belonging.left_out
 
     @cached_property
     def audit(self) -> LogAudit:

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from slamreplay.bundle.findings import Finding, Severity
+from slamreplay.consistency.amcl_limits import amcl_limits
 from slamreplay.consistency.answers import Answer, Suspicion
 from slamreplay.consistency.context import CheckContext
 from slamreplay.consistency.evidence import Reference
-from slamreplay.consistency.nees import Nees, Part, nees
+from slamreplay.consistency.nees import PARTS, Nees, Part, nees
 from slamreplay.consistency.nees_summary import NeesSummary
 
 #: Off by this factor the covariance misleads whoever plans with it: an error, not a warning.
@@ -17,7 +20,7 @@ def nees_of_belief(context: CheckContext) -> Nees | None:
     """NEES of the belief at its own updates against the best reference; None without either."""
     if context.updates is None or context.reference is None:
         return None
-    return nees(context.updates, context.reference.track)
+    return nees(context.updates, context.reference.track, left_out=context.left_out)
 
 
 def judged_parts(result: Nees) -> tuple[Part, ...]:
@@ -38,21 +41,28 @@ def check(context: CheckContext) -> tuple[Answer, ...]:
         return (_undecided(f"the covariance could not be held against an error: {lacks}"),)
     if result.refusal is not None:
         return (_undecided(f"NEES refused: {result.refusal}", result),)
-    summaries = [result.summary(part) for part in judged_parts(result)]
+    if context.belonging is not None and context.belonging.refusal is not None:
+        return (_undecided(f"NEES refused: {context.belonging.refusal}", result),)
+    limits = amcl_limits(context)
+    limits = f"; {limits}" if limits else ""
+    parts = {part: result.summary(part) for part in judged_parts(result)}
+    summaries = list(parts.values())
     reference = context.reference
     if all(s.credibility == "insufficient" for s in summaries):
         few = max(s.test.n_eff for s in summaries)
         text = f"too few independent updates ({few:.0f}) to judge the covariance against "
-        text += f"{reference.kind}: {summaries[0].sentence}"
+        text += f"{reference.kind}: {summaries[0].sentence}{limits}"
         return (_undecided(text, result, few),)
     answers: list[Answer] = [
-        _suspicion(result, s, reference) for s in summaries if s.credibility != "insufficient"
+        _suspicion(result, s, reference, f"{_effect(result, part, s)}{limits}")
+        for part, s in parts.items()
+        if s.credibility != "insufficient"
     ]
     accused = [s for s in summaries if s.credibility == "overconfident" and _gross(s)]
     if reference.shared and not accused:
         text = (
             "no gross over-confidence against hindsight, which shares the robot's scans and "
-            f"therefore cannot prove consistency: {summaries[0].sentence}"
+            f"therefore cannot prove consistency: {summaries[0].sentence}{limits}"
         )
         answers.append(_undecided(text, result, summaries[0].test.n_eff))
     return tuple(answers)
@@ -62,14 +72,31 @@ def _gross(summary: NeesSummary) -> bool:
     return (summary.test.ratio or 0.0) >= GROSS
 
 
-def _suspicion(result: Nees, summary: NeesSummary, reference: Reference) -> Suspicion:
+def _effect(result: Nees, part: Part, summary: NeesSummary) -> str:
+    """What sigma was claimed for which error, and what such a sigma does."""
+    rows = np.isfinite(result.values(part))
+    claimed, real = [], []
+    for axes, scale, unit in (((0, 1), 1.0, "m"), ((2,), 180.0 / np.pi, "deg")):
+        if not set(axes) <= set(PARTS[part]):
+            continue
+        variance = np.diagonal(result.cov[rows], axis1=1, axis2=2)[:, axes].mean(axis=1)
+        claimed.append(f"{scale * np.sqrt(np.median(variance)):.2g} {unit}")
+        real.append(f"{scale * np.sqrt(np.mean(result.error[rows][:, axes] ** 2)):.2g} {unit}")
+    does = "actions pass that there is no room for"
+    if (summary.test.ratio or 0.0) < 1.0:
+        does = "gates stay open for wrong matches, recoveries and slow driving are needless"
+    told = f"sigma {' and '.join(claimed)} (median) for an error of {' and '.join(real)} (rms)"
+    return f"; {told}: {does}"
+
+
+def _suspicion(result: Nees, summary: NeesSummary, reference: Reference, more: str) -> Suspicion:
     severity: Severity = "error" if _gross(summary) else "warning"
     skipped = ", ".join(f"{count} {reason}" for reason, count in result.invalid.items())
     note = f" (left out: {skipped})" if skipped else ""
     finding = Finding(
         "SR-CON-001",
         severity,
-        f"{summary.sentence}, against {reference.kind.replace('_', ' ')}{note}",
+        f"{summary.sentence}, against {reference.kind.replace('_', ' ')}{note}{more}",
         start_ns=int(result.t_ns[0]),
         end_ns=int(result.t_ns[-1]),
         value=summary.test.mean,

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
+from numpy.typing import NDArray
 
 from slamreplay.bundle.track import PoseTrack
 from slamreplay.bundle.view import BundleView
@@ -35,13 +36,22 @@ def updates_of(
     return fresh.take(order) if len(fresh) else None
 
 
-def evidence_of(updates: PoseTrack, references: tuple[Reference, ...]) -> tuple[Evidence, ...]:
-    """The errors of the updates (N rows) against every source, the best first."""
-    return tuple(_against(updates, reference) for reference in references)
+def evidence_of(
+    updates: PoseTrack,
+    references: tuple[Reference, ...],
+    left_out: NDArray[np.bool_] | None = None,
+) -> tuple[Evidence, ...]:
+    """The errors of the updates (N rows) against every source, the best first.
+
+    Those of rows (N,) that are left out are NaN: their mean and covariance part.
+    """
+    return tuple(_against(updates, reference, left_out) for reference in references)
 
 
-def _against(updates: PoseTrack, reference: Reference) -> Evidence:
-    result = nees(updates, reference.track)
+def _against(
+    updates: PoseTrack, reference: Reference, left_out: NDArray[np.bool_] | None
+) -> Evidence:
+    result = nees(updates, reference.track, left_out=left_out)
     words = reference.kind.replace("_", " ")
     source = words if reference.source == reference.kind else f"{words} {reference.source}"
     axes = ("x m", "y m", "yaw rad")

@@ -23,6 +23,8 @@ from slamreplay.geometry.transforms import clean_frame
 
 #: A reference is interpolated between samples no farther apart than this.
 MAX_GAP_NS = 500_000_000
+#: The variance of a heading that may be any, uniform over the circle, rad^2: no heading is known.
+ANY_HEADING = np.pi**2 / 3.0
 
 Part = Literal["joint", "xy", "yaw"]
 PARTS: dict[Part, tuple[int, ...]] = {"joint": (0, 1, 2), "xy": (0, 1), "yaw": (2,)}
@@ -68,18 +70,24 @@ class Nees:
         return NeesSummary(NAMES[part], mean_test(white))
 
 
-def nees(estimate: PoseTrack, reference: PoseTrack, max_gap_ns: int = MAX_GAP_NS) -> Nees:
+def nees(
+    estimate: PoseTrack,
+    reference: PoseTrack,
+    max_gap_ns: int = MAX_GAP_NS,
+    left_out: NDArray[np.bool_] | None = None,
+) -> Nees:
     """NEES of a belief at its own rows, the reference interpolated between its samples.
 
     The reference's covariance is added where it is finite; of a reference without heading only
-    `xy` is given. Two tracks in different frames are refused, not aligned: every row is invalid
-    then and `refusal` says why.
+    `xy` is given, and where the belief's heading may be any. Two tracks in different frames are
+    refused, not aligned: every row is invalid then and `refusal` says why.
 
     Args:
         estimate: the belief, one row per update: a covariance that was merely held from the update
             before would count the same evidence again.
         reference: the independent pose of the same frame of the robot, in the same parent frame.
         max_gap_ns: rows between two reference samples farther apart than this stay invalid.
+        left_out: (N,) rows of the estimate whose mean and covariance do not belong together.
     """
     order = np.argsort(estimate.t_ns, kind="stable")
     estimate = estimate.take(order)
@@ -93,12 +101,19 @@ def nees(estimate: PoseTrack, reference: PoseTrack, max_gap_ns: int = MAX_GAP_NS
             f"'{reference.frame_id}', and nothing independent of the belief ties them"
         )
         error = np.full_like(error, np.nan)
+    left_out = np.zeros(len(order), dtype=bool) if left_out is None else left_out[order]
+    error[left_out] = np.nan
+    with np.errstate(invalid="ignore"):
+        headless = estimate.cov[:, 2, 2] > ANY_HEADING
+    error[headless, 2] = np.nan
     cov = estimate.cov + np.where(np.isfinite(truth.cov), truth.cov, 0.0)
     parts = {part: _squared(error, cov, list(index)) for part, index in PARTS.items()}
     reasons = {
         "frames differ": np.full(len(estimate), refusal is not None),
         "no belief": ~estimate.has_pose,
+        "mean and covariance of different particles": left_out,
         "no reference": ~np.isfinite(error[:, :2]).all(axis=1),
+        "no heading known (any would do)": headless,
         "no reference heading": ~np.isfinite(error[:, 2]),
         "no covariance": ~np.isfinite(cov).all(axis=(1, 2)),
         "covariance not positive definite": ~np.isfinite(parts["joint"]),
