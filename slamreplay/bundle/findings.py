@@ -144,6 +144,17 @@ FINDINGS: dict[str, Explanation] = {
         "samples (n over the integrated autocorrelation time of the NEES series).",
         "Undecided is neither consistent nor inconsistent.",
     ),
+    "SR-CON-004": Explanation(
+        "The errors are not distributed as the covariance says",
+        "Do the ellipses of 50, 68, 90, 95 and 99 % hold as many of the errors as they claim?",
+        "u = F(e' P^-1 e) with the chi-square distribution function F, which is uniform where the "
+        "covariance is right, against the uniform distribution after Kolmogorov and Smirnov "
+        "(Stephens 1974), for the effective number of samples by the correlation of the ranks. The "
+        "same after the errors were divided by their own scale tells a wrong scale, which "
+        "SR-CON-001 is about, from a wrong shape.",
+        "A constant offset makes all errors alike in size, and so does a reference that is off. "
+        "Sources that share evidence with the belief are shown and never accuse.",
+    ),
     "SR-CON-010": Explanation(
         "The covariance collapsed",
         "From when on did sigma shrink or stand while the error grew, or shrink for no reason?",

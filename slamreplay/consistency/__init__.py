@@ -8,6 +8,7 @@ CHECKS = Registry(
         "clock": "slamreplay.consistency.clock:check",
         "collapse": "slamreplay.consistency.collapse.check:check",
         "covariance": "slamreplay.consistency.validity:check",
+        "distribution": "slamreplay.consistency.shape:check",
         "lasers": "slamreplay.consistency.lasers:check",
         "losses": "slamreplay.consistency.completeness:check_losses",
         "missing": "slamreplay.consistency.completeness:check_missing",
@@ -33,4 +34,4 @@ AUDITS = (
 )
 
 #: The checks that concern a belief, whoever holds it: runs of estimators are asked them too.
-ABOUT_BELIEF = frozenset({"collapse", "nees"})
+ABOUT_BELIEF = frozenset({"collapse", "distribution", "nees"})
