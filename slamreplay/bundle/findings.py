@@ -155,6 +155,17 @@ FINDINGS: dict[str, Explanation] = {
         "A constant offset makes all errors alike in size, and so does a reference that is off. "
         "Sources that share evidence with the belief are shown and never accuse.",
     ),
+    "SR-CON-005": Explanation(
+        "The covariance is not credible",
+        "Is the claimed covariance the actual mean square error matrix, in every direction?",
+        "Noncredibility index NCI = 10/N sum |log10 rho| and inclination I2 = 10/N sum log10 rho, "
+        "rho = e' P^-1 e / e' P*^-1 e with the actual matrix P* (Li and Zhao 2006); 3 dB are a "
+        "factor of 2 in the variance, I2 above 0 is too small. P* is the second moment of the "
+        "whitened errors; likelihood ratio tests say whether it is the claimed one, and whether "
+        "one factor would mend it (Rencher and Christensen 2012, section 7.2).",
+        "P* comes from the same log, and takes all rows to be off by the same factors; with few "
+        "effective samples the index is never quite zero.",
+    ),
     "SR-CON-010": Explanation(
         "The covariance collapsed",
         "From when on did sigma shrink or stand while the error grew, or shrink for no reason?",

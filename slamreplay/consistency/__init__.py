@@ -8,6 +8,7 @@ CHECKS = Registry(
         "clock": "slamreplay.consistency.clock:check",
         "collapse": "slamreplay.consistency.collapse.check:check",
         "covariance": "slamreplay.consistency.validity:check",
+        "credibility_index": "slamreplay.consistency.credible:check",
         "distribution": "slamreplay.consistency.shape:check",
         "lasers": "slamreplay.consistency.lasers:check",
         "losses": "slamreplay.consistency.completeness:check_losses",
@@ -34,4 +35,4 @@ AUDITS = (
 )
 
 #: The checks that concern a belief, whoever holds it: runs of estimators are asked them too.
-ABOUT_BELIEF = frozenset({"collapse", "distribution", "nees"})
+ABOUT_BELIEF = frozenset({"collapse", "credibility_index", "distribution", "nees"})

@@ -142,7 +142,7 @@ def effective_ranks(series: ArrayLike) -> tuple[float, float]:
 def _middle_ranks(ascending: Array, values: Array) -> Array:
     """Where values (M,) stand among ascending ones (N,): 0 to N, ties at the middle of theirs."""
     low = np.searchsorted(ascending, values, side="left")
-    return 0.5 * (low + np.searchsorted(ascending, values, side="right"))
+    return np.asarray(0.5 * (low + np.searchsorted(ascending, values, side="right")))
 
 
 def _stephens(n_eff: ArrayLike) -> Array:
