@@ -144,6 +144,28 @@ FINDINGS: dict[str, Explanation] = {
         "samples (n over the integrated autocorrelation time of the NEES series).",
         "Undecided is neither consistent nor inconsistent.",
     ),
+    "SR-CON-004": Explanation(
+        "The errors are not distributed as the covariance says",
+        "Do the ellipses of 50, 68, 90, 95 and 99 % hold as many of the errors as they claim?",
+        "u = F(e' P^-1 e) with the chi-square distribution function F, which is uniform where the "
+        "covariance is right, against the uniform distribution after Kolmogorov and Smirnov "
+        "(Stephens 1974), for the effective number of samples by the correlation of the ranks. The "
+        "same after the errors were divided by their own scale tells a wrong scale, which "
+        "SR-CON-001 is about, from a wrong shape.",
+        "A constant offset makes all errors alike in size, and so does a reference that is off. "
+        "Sources that share evidence with the belief are shown and never accuse.",
+    ),
+    "SR-CON-005": Explanation(
+        "The covariance is not credible",
+        "Is the claimed covariance the actual mean square error matrix, in every direction?",
+        "Noncredibility index NCI = 10/N sum |log10 rho| and inclination I2 = 10/N sum log10 rho, "
+        "rho = e' P^-1 e / e' P*^-1 e with the actual matrix P* (Li and Zhao 2006); 3 dB are a "
+        "factor of 2 in the variance, I2 above 0 is too small. P* is the second moment of the "
+        "whitened errors; likelihood ratio tests say whether it is the claimed one, and whether "
+        "one factor would mend it (Rencher and Christensen 2012, section 7.2).",
+        "P* comes from the same log, and takes all rows to be off by the same factors; with few "
+        "effective samples the index is never quite zero.",
+    ),
     "SR-CON-010": Explanation(
         "The covariance collapsed",
         "From when on did sigma shrink or stand while the error grew, or shrink for no reason?",

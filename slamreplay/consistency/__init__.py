@@ -9,6 +9,8 @@ CHECKS = Registry(
         "clock": "slamreplay.consistency.clock:check",
         "collapse": "slamreplay.consistency.collapse.check:check",
         "covariance": "slamreplay.consistency.validity:check",
+        "credibility_index": "slamreplay.consistency.credible:check",
+        "distribution": "slamreplay.consistency.shape:check",
         "lasers": "slamreplay.consistency.lasers:check",
         "losses": "slamreplay.consistency.completeness:check_losses",
         "missing": "slamreplay.consistency.completeness:check_missing",
@@ -34,4 +36,4 @@ AUDITS = (
 )
 
 #: The checks that concern a belief, whoever holds it: runs of estimators are asked them too.
-ABOUT_BELIEF = frozenset({"belonging", "collapse", "nees"})
+ABOUT_BELIEF = frozenset({"belonging", "collapse", "credibility_index", "distribution", "nees"})
