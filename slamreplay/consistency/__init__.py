@@ -8,15 +8,19 @@ CHECKS = Registry(
         "clock": "slamreplay.consistency.clock:check",
         "collapse": "slamreplay.consistency.collapse.check:check",
         "covariance": "slamreplay.consistency.validity:check",
+        "innovation_bias": "slamreplay.consistency.innovation_bias:check",
         "lasers": "slamreplay.consistency.lasers:check",
         "losses": "slamreplay.consistency.completeness:check_losses",
         "missing": "slamreplay.consistency.completeness:check_missing",
         "nees": "slamreplay.consistency.credibility:check",
+        "nis": "slamreplay.consistency.nis:check",
         "numbers": "slamreplay.consistency.numbers:check",
+        "scan_likelihood": "slamreplay.consistency.scan_likelihood:check",
         "stamps": "slamreplay.consistency.stamps:check",
         "tf_steps": "slamreplay.consistency.tf_steps:check",
         "tf_times": "slamreplay.consistency.tf_times:check",
         "tf_tree": "slamreplay.consistency.tf_tree:check",
+        "whiteness": "slamreplay.consistency.whiteness:check",
     },
 )
 
@@ -33,4 +37,6 @@ AUDITS = (
 )
 
 #: The checks that concern a belief, whoever holds it: runs of estimators are asked them too.
-ABOUT_BELIEF = frozenset({"collapse", "nees"})
+ABOUT_BELIEF = frozenset(
+    {"collapse", "innovation_bias", "nees", "nis", "scan_likelihood", "whiteness"}
+)
