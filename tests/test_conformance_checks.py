@@ -22,11 +22,31 @@ def torn(seed):
     return replace(sound, subject="amcl", diagnostics=diagnostics)
 
 
+def unlikely_scans(seed):
+    """A particle filter that is surprised by every fifth scan."""
+    rng = np.random.default_rng(seed)
+    ranks = np.where(rng.random(600) < 0.2, 0, rng.integers(0, 20, 600))
+    return replace(believed(seed), diagnostics={"likelihood_quantile": (ranks + 0.5) / 20.0})
+
+
+def remembered(seed):
+    """Innovations that share half of their noise with the one before."""
+    context = believed(seed)
+    (seen,) = context.innovations
+    residual = seen.residual.copy()
+    residual[1:] = 0.8 * seen.residual[1:] + 0.6 * seen.residual[:-1]
+    return replace(context, innovations=(replace(seen, residual=residual),))
+
+
 #: Of each check about a belief: the finding that names its defect, and a log that has it.
 BELIEF_LINES = {
     "belonging": ("SR-CON-011", torn),
     "collapse": ("SR-CON-010", partial(believed, collapsed=0.1)),
+    "innovation_bias": ("SR-CON-008", partial(believed, bias=0.5)),
     "nees": ("SR-CON-001", partial(believed, rows=3000, told=0.5)),
+    "nis": ("SR-CON-006", partial(believed, told=0.5)),
+    "scan_likelihood": ("SR-CON-009", unlikely_scans),
+    "whiteness": ("SR-CON-007", remembered),
 }
 
 

@@ -166,6 +166,54 @@ FINDINGS: dict[str, Explanation] = {
         "P* comes from the same log, and takes all rows to be off by the same factors; with few "
         "effective samples the index is never quite zero.",
     ),
+    "SR-CON-006": Explanation(
+        "Innovations are not as large as predicted",
+        "Are measured minus predicted values as large as the filter's own S = H P H' + R says?",
+        "Mean of r' S^-1 r by source, and of r_i^2 / S_ii by axis (Bonferroni), against the "
+        "chi-square interval for the effective number of samples (Bar-Shalom, Li, Kirubarajan "
+        "2001, section 5.4.2). Only what the update used is tested; where its gate cut off by NIS, "
+        "against the chi-square without what lies beyond. Rejected ones are counted against the "
+        "chance of the gate. Estimators that hand on innovations only, not a recorded localizer.",
+        "Whether R or Q is to blame it cannot tell: see SR-CON-007. Scaling both by the factor "
+        "makes S fit. A gate far out of tune lets through what fits it.",
+    ),
+    "SR-CON-007": Explanation(
+        "Innovations hang together in time",
+        "Is each innovation new, or does it follow from the ones before?",
+        "Squared autocorrelations of the whitened innovations of each axis at lags 1 to "
+        "min(10, n / 5), in order of time, added up as by Ljung and Box (1978, Biometrika 65, "
+        "297-303), each over its variance as found, so that a sigma that is wrong for a stretch "
+        "is no correlation (Dalla, Giraitis, Phillips 2022, Econometric Theory 38). Too small a "
+        "gain leaves positive correlation, too large a one negative (Mehra 1970, IEEE Trans. "
+        "Automatic Control 15, 175-184). Below 0.1 it changes little and is told as info.",
+        "Lags are counted in innovations, not in seconds: several things seen in turn, each with "
+        "an error of its own, show at the lag of their number.",
+    ),
+    "SR-CON-008": Explanation(
+        "A sensor measures too much or too little",
+        "Is measured minus predicted zero on average?",
+        "Student's t of the mean of each axis, with effective samples (n over the integrated "
+        "autocorrelation time) for samples. How grave it is goes by its size in sigmas of the "
+        "innovation: below 0.2 it is lost in the noise, however sure it is.",
+        "A filter that leans on the sensor takes over part of its bias: the true one is larger "
+        "then. An error of the survey, of the mount or of odometry looks the same. Things seen "
+        "from one side only turn a lateness into a bias.",
+    ),
+    "SR-CON-009": Explanation(
+        "Scans are not as likely as the particle filter predicts",
+        "Do scans look like those that the filter's own cloud and laser model would give?",
+        "A particle filter has no S. At each update 19 particles are drawn from the cloud after "
+        "its motion and before the scan, and a scan for each: beams at the map's first wall with "
+        "noise of sigma_hit, or, z_rand of (z_hit + z_rand) of them, anywhere. The rank of the "
+        "real scan's likelihood (mean over the cloud of the product of the field's values) among "
+        "them is even if cloud and model are right; counted is the lowest twentieth (binomial). "
+        "Only for the replayed amcl: a recorded localizer leaves no cloud to draw from.",
+        "A likelihood field is no model of ranges: that draws stand for it is a label, not its "
+        "derivation. A changed map and crowds make scans unlikely as well: then it is the world. "
+        "nav2's default (half of the beams random, 0.2 m) predicts nearly everything: robots that "
+        "were lost for minutes gave ranks near the top. Silence proves nothing there, and "
+        "SR-CON-003 says so.",
+    ),
     "SR-CON-010": Explanation(
         "The covariance collapsed",
         "From when on did sigma shrink or stand while the error grew, or shrink for no reason?",

@@ -13,11 +13,13 @@ from slamreplay.bundle.track import PoseTrack
 from slamreplay.bundle.view import BundleView
 from slamreplay.estimators.amcl.config import AmclConfig
 from slamreplay.estimators.amcl.filter import AmclFilter
+from slamreplay.estimators.amcl.laser import Beams, used_beams
+from slamreplay.estimators.amcl.scan_quantile import ScanQuantile
 from slamreplay.estimators.inputs import need_grid, need_odometry, need_scans
 from slamreplay.estimators.start import DEFAULT_COV, GLOBAL, OFFSET, ROTATE, Start, starts
 from slamreplay.geometry import se2
 
-_DIAGNOSTICS = ("updated", "particles", "ess", "clusters")
+_DIAGNOSTICS = ("updated", "particles", "ess", "clusters", "likelihood_quantile")
 
 
 @dataclass(frozen=True)
@@ -30,9 +32,11 @@ class Amcl:
 
     Attributes:
         config: nav2_amcl's parameters.
+        judge_scans: whether `likelihood_quantile` is measured; the estimate is the same without.
     """
 
     config: AmclConfig = field(default_factory=AmclConfig)
+    judge_scans: bool = True
 
     name: ClassVar[str] = "amcl"
     needs: ClassVar[frozenset[str]] = frozenset({"odometry", "scans", "map"})
@@ -42,8 +46,10 @@ class Amcl:
         """One row per scan; NaN before the start and where the scan has no odometry.
 
         Diagnostics: `updated` (1 where the filter took the scan in), `particles`, `ess`, the
-        effective sample size before the latest resampling, and `clusters`, how many carry a tenth
-        of the weight or more: the mean is the heaviest one's, the covariance that of all.
+        effective sample size before the latest resampling, `clusters`, how many carry a tenth of
+        the weight or more: the mean is the heaviest one's, the covariance that of all, and at
+        updates `likelihood_quantile`, the rank from 0 to 1 of the scan's likelihood among scans
+        drawn from the filter's own prediction.
 
         Raises:
             NotApplicableError: no odometry, scans or map.
@@ -57,6 +63,7 @@ class Amcl:
         if not given and len(known):
             given = {int(known[0]): Start(int(known[0]), None, DEFAULT_COV)}
         amcl = AmclFilter(self.config, grid, seed)
+        quantile = ScanQuantile(self.config, grid, amcl.distance_m, seed)
 
         n = len(scans)
         xyyaw, cov = np.full((n, 3), np.nan), np.full((n, 3, 3), np.nan)
@@ -66,8 +73,14 @@ class Amcl:
         for row in known[known >= first].tolist():
             if row in given:
                 _start(amcl, given[row])
-            updated = _update(amcl, scans, row, T_odom_base[row])
+            updated = amcl.is_due(T_odom_base[row])
             if updated:
+                amcl.predict(T_odom_base[row])
+                beams = self._beams(scans, row)
+                if self.judge_scans:
+                    rank = quantile(amcl.particles, amcl.weights, beams)
+                    diagnostics["likelihood_quantile"][row] = rank
+                amcl.correct(beams)
                 T_map_odom = se2.compose(amcl.mean_xyyaw, se2.inverse(T_odom_base[row]))
                 published, clusters = amcl.cov, amcl.clusters
             xyyaw[row] = se2.compose(T_map_odom, T_odom_base[row])
@@ -82,22 +95,19 @@ class Amcl:
         )
         return Estimate(track, (), diagnostics)
 
+    def _beams(self, scans: ScanSet, row: int) -> Beams:
+        return used_beams(
+            self.config,
+            scans.bearings(row),
+            scans.ranges_m[row],
+            scans.hits[row],
+            scans.xyyaw_base_laser,
+            float(scans.range_max_m[row]),
+        )
+
 
 def _start(amcl: AmclFilter, start: Start) -> None:
     if start.xyyaw is None:
         amcl.initialise_globally()
     else:
         amcl.initialise(start.xyyaw, start.cov)
-
-
-def _update(amcl: AmclFilter, scans: ScanSet, row: int, T_odom_base: se2.Array) -> bool:
-    if not amcl.is_due(T_odom_base):
-        return False
-    return amcl.update(
-        T_odom_base,
-        scans.bearings(row),
-        scans.ranges_m[row],
-        scans.hits[row],
-        scans.xyyaw_base_laser,
-        float(scans.range_max_m[row]),
-    )

@@ -15,6 +15,7 @@ from slamreplay.estimators.amcl.cloud import (
     histogram,
 )
 from slamreplay.estimators.amcl.config import AmclConfig
+from slamreplay.estimators.amcl.laser import Beams, likelihood_table, used_beams
 from slamreplay.estimators.start import DEFAULT_COV
 from slamreplay.geometry import se2
 from slamreplay.maps.grid import OccupancyGrid
@@ -56,6 +57,11 @@ class AmclFilter:
     def weights(self) -> se2.Array:
         """(N,) weights that sum to 1, read-only."""
         return self._weights
+
+    @property
+    def distance_m(self) -> NDArray[np.float32]:
+        """(H, W) distance from each cell of the map to the nearest wall, cut, m."""
+        return self._distance_m
 
     @property
     def mean_xyyaw(self) -> se2.Array:
@@ -142,19 +148,24 @@ class AmclFilter:
         """
         if not self.is_due(odometry_xyyaw):
             return False
+        self.predict(odometry_xyyaw)
+        mount = xyyaw_base_laser
+        self.correct(used_beams(self._config, bearings, ranges_m, usable, mount, range_max_m))
+        return True
+
+    def predict(self, odometry_xyyaw: ArrayLike) -> None:
+        """Move the cloud to odometry (3,): what it then is was known before the next scan."""
         odometry = np.array(odometry_xyyaw, dtype=np.float64)
         if self._last_odometry is not None:
             self._move(self._last_odometry[2], _delta(self._last_odometry, odometry))
         self._last_odometry = odometry
-        limit = self._config.laser_max_range if self._config.laser_max_range > 0.0 else np.inf
-        reach = min(range_max_m if range_max_m > 0.0 else np.inf, limit)
-        reach = reach if np.isfinite(reach) else 100.0  # neither the laser nor the user said one
-        ends = self._beam_ends(bearings, ranges_m, usable, xyyaw_base_laser, reach)
-        self._weigh(ends, reach)
+
+    def correct(self, beams: Beams) -> None:
+        """Weigh the cloud by a scan, and draw it anew where that is due."""
+        self._weigh(beams)
         self._updates += 1
         if self._updates % self._config.resample_interval == 0:
             self._resample()
-        return True
 
     def _move(self, old_yaw: float, delta: se2.Array) -> None:
         """nav2's differential model: the bearing of a step under 1 cm is not trusted."""
@@ -176,30 +187,15 @@ class AmclFilter:
         kernels.move(particles, np.array([turn1, distance, turn2]), np.sqrt(variance), noise)
         self._adopt(particles, self._weights)
 
-    def _beam_ends(
-        self,
-        bearings: ArrayLike,
-        ranges_m: ArrayLike,
-        usable: ArrayLike,
-        xyyaw_base_laser: ArrayLike,
-        reach_m: float,
-    ) -> se2.Array:
-        bearing = np.asarray(bearings, dtype=np.float64)
-        reach = np.asarray(ranges_m, dtype=np.float64)
-        used = np.zeros(len(bearing), dtype=bool)
-        if self._config.max_beams >= 2:
-            used[:: max(1, (len(bearing) - 1) // (self._config.max_beams - 1))] = True
-        with np.errstate(invalid="ignore"):
-            used &= np.asarray(usable, dtype=bool) & (reach < reach_m)
-        ends = reach[used, None] * np.column_stack([np.cos(bearing[used]), np.sin(bearing[used])])
-        return np.ascontiguousarray(se2.transform_points(xyyaw_base_laser, ends).T)
-
-    def _weigh(self, ends: se2.Array, reach_m: float) -> None:
-        if self._scores_range_m != reach_m:
-            self._scores, self._scores_range_m = self._score_table(reach_m), reach_m
+    def _weigh(self, beams: Beams) -> None:
+        if self._scores_range_m != beams.reach_m:
+            # A beam's likelihood cubed: nav2's ad-hoc weighting scheme.
+            likelihood = likelihood_table(self._config, self._distance_m, beams.reach_m)
+            self._scores = (likelihood**3).astype(np.float32)
+            self._scores_range_m = beams.reach_m
         likelihood = kernels.likelihoods(
             self._particles,
-            ends,
+            beams.ends,
             self._scores,
             self._grid.origin_xyyaw,
             self._grid.resolution_m,
@@ -212,14 +208,6 @@ class AmclFilter:
         weights /= average
         self._ess = float(1.0 / np.sum(weights**2))
         self._adopt(self._particles, weights)
-
-    def _score_table(self, reach_m: float) -> NDArray[np.float32]:
-        """A beam's likelihood cubed, by the cell it ends in: nav2's ad-hoc weighting scheme."""
-        c = self._config
-        border = c.laser_likelihood_max_dist
-        distance = np.pad(self._distance_m.astype(np.float64), 1, constant_values=border)
-        likelihood = c.z_hit * np.exp(-(distance**2) / (2.0 * c.sigma_hit**2)) + c.z_rand / reach_m
-        return (likelihood**3).astype(np.float32)
 
     def _resample(self) -> None:
         c = self._config
