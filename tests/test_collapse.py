@@ -1,6 +1,7 @@
 """The covariance collapsed: one finding with the right onset and duration; sound beliefs silent."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from slamreplay.bundle.run import Innovations
 from slamreplay.bundle.schema import TABLES
 from slamreplay.bundle.tables import Table
 from slamreplay.bundle.track import PoseTrack
+from slamreplay.consistency.amcl_limits import is_amcl
 from slamreplay.consistency.answers import raised
 from slamreplay.consistency.asking import ask
 from slamreplay.consistency.collapse.check import check
@@ -18,12 +20,15 @@ from slamreplay.consistency.collapse.floor import sensor_floor
 from slamreplay.consistency.collapse.stretch import Stretch, merged
 from slamreplay.consistency.context import CheckContext
 from slamreplay.consistency.evidence import Reference
+from slamreplay.consistency.references import references_of
 from slamreplay.consistency.sign_correlation import sign_correlation, squares_time
 from slamreplay.geometry import se2, se3
 from slamreplay.geometry.covariance import ros_from_planar
+from slamreplay.ingest.pipeline import ingest
 from slamreplay.testing.edits import rebuilt
 from slamreplay.testing.synthetic import START_NS, synthetic_bundle, true_path
 
+ROOT = Path(__file__).resolve().parents[1]
 SECOND = 1_000_000_000
 ROOM = synthetic_bundle(seconds=80.0)
 SIGMA = np.array([0.05, 0.05, 0.01])
@@ -339,6 +344,41 @@ def test_sigma_below_what_a_scan_can_tell():
     assert sensor_floor(without.view) is None
 
 
+def sighted(n, sigma_m):
+    """Sightings of a tag, each with its noise."""
+    t_ns = START_NS + np.arange(n) * SECOND // 10
+    cov = (
+        np.full((n, 36), np.nan) if sigma_m is None else np.tile(np.eye(6) * sigma_m**2, (n, 1, 1))
+    )
+    return Table(
+        TABLES["references"],
+        {
+            **dict.fromkeys(("t_ns", "t_sensor_ns", "t_log_ns"), t_ns),
+            "topic": ["/tags"] * n,
+            "frame_id": ["camera"] * n,
+            "child_frame_id": ["tag_1"] * n,
+            "kind": ["fiducial"] * n,
+            "position_xyz": np.ones((n, 3)),
+            "orientation_xyzw": np.tile([0.0, 0.0, 0.0, 1.0], (n, 1)),
+            "covariance": cov.reshape(n, 36),
+        },
+    )
+
+
+def test_sightings_lower_the_floor_and_take_it_away_where_their_noise_is_unknown():
+    t = times()
+    zero, sigma = np.zeros((len(t), 3)), breathing(len(t))
+
+    def floor(*tables, grid="same"):
+        return sensor_floor(context(t, zero, sigma, kind=None, tables=tables, grid=grid).view)
+
+    alone, both = floor(sighted(100, 0.02), grid=None), floor(sighted(100, 0.02))
+    assert alone.position_m == pytest.approx(0.02 / 10)
+    assert both.position_m**-2 == pytest.approx(alone.position_m**-2 + floor().position_m ** -2)
+    assert both.heading_rad == 0.0
+    assert floor(sighted(3, None)) is None
+
+
 def test_a_map_that_is_being_made_begins_with_a_pose_that_is_known():
     t = times()
     grows = np.interp(t, [0.0, 60.0], [2e-4, 0.02])[:, None] * np.array([1.0, 1.0, 0.5])
@@ -419,3 +459,30 @@ def test_sound_beliefs_are_left_alone(sound):
     accused = [f for seed in range(200) for f in told(raised(check(sound(seed))))]
 
     assert len(accused) <= 2, [f.message for f in accused]
+
+
+# --- logs ---------------------------------------------------------------------------------------
+
+
+def asked(path, folder):
+    bundle = ingest([path], folder)
+    known = references_of(bundle, None)
+    return told(ask([CheckContext(None, known, bundle.view())], ["collapse"])), bundle
+
+
+@pytest.mark.parametrize(
+    ("name", "onset_s"), [("healthy", None), ("changed_aisle", None), ("lost_robot", 0.1)]
+)
+def test_sample_logs(name, onset_s, tmp_path):
+    found, bundle = asked(ROOT / "sample_logs" / f"{name}.mcap", tmp_path / "b")
+    onsets = [(f.start_ns - bundle.manifest.start_ns) / 1e9 for f in found]
+
+    assert onsets == ([] if onset_s is None else [pytest.approx(onset_s, abs=0.1)])
+
+
+@pytest.mark.parametrize("name", ["evo_nav2/nav2_turtlebot.mcap"])
+def test_a_recorded_amcl_is_known_as_one_and_has_not_collapsed(name, real_logs, tmp_path):
+    found, bundle = asked(real_logs / name, tmp_path / "b")
+
+    assert found == []
+    assert is_amcl(CheckContext(None, (), bundle.view()))

@@ -126,10 +126,12 @@ FINDINGS: dict[str, Explanation] = {
         "Is the normalised estimation error squared what a consistent estimator would show?",
         "NEES e' (P + P_ref)^-1 e per row, e = belief minus reference in x, y and wrapped yaw; its "
         "mean against the chi-square interval for the effective number of samples (Bar-Shalom, "
-        "Li, Kirubarajan 2001, section 5.4).",
+        "Li, Kirubarajan 2001, section 5.4), too small and too large alike. Where position and "
+        "heading are not coupled, as in AMCL, they are judged apart; a heading whose variance is "
+        "beyond pi^2 / 3, uniform over the circle, is not known and left out.",
         "A reference that shares evidence with the belief, as hindsight does, can show "
         "over-confidence and never proves consistency. AMCL's mean and covariance may come from "
-        "different clusters.",
+        "different clusters: SR-CON-011 where the log has its particles.",
     ),
     "SR-CON-002": Explanation(
         "Covariances that are none",
@@ -222,13 +224,15 @@ FINDINGS: dict[str, Explanation] = {
         "against chi-square of their independent samples; p times the windows looked at "
         "(Bonferroni scan, Walther 2022, arXiv:2107.08296). Onset and end by the largest sum of "
         "log-likelihood ratios (Page 1954, Biometrika 41). A belief that is too sure of itself all "
-        "the time is SR-CON-001's. Facts: sigma smaller by a quarter although nothing was sensed "
-        "or taken in; sigma below r / sqrt(12 N) of N beams in a map of cells r (the bound of "
-        "Censi 2007, On achievable accuracy for range-finder localization). One finding for all "
-        "that overlap; its value is the factor by which sigma was too small, or shrank.",
+        "the time is SR-CON-001's. Facts: sigma smaller by a fifth although nothing was sensed or "
+        "taken in; sigma below r / sqrt(12 N) of N beams in a map of cells r (the bound of Censi "
+        "2007, On achievable accuracy for range-finder localization), less what sightings and "
+        "fixes add. One finding for all that overlap; its value is the factor by which sigma was "
+        "too small, or shrank.",
         "A reference that jumps makes any belief look too sure of itself. What shares evidence "
         "with the belief proves nothing where it is silent. A localizer may have used sensors "
-        "that are not in the log. The floor takes the map's cells as all that is known of walls.",
+        "that are not in the log, and a smoother what came later. The floor takes the map's cells "
+        "as all that is known of walls.",
     ),
     "SR-CON-011": Explanation(
         "Mean and covariance do not belong together",

@@ -11,6 +11,7 @@ from slamreplay.bundle.view import BundleView
 from slamreplay.consistency.collapse.size import heading_sigma, position_sigma
 from slamreplay.consistency.collapse.stretch import Stretch
 from slamreplay.consistency.context import CheckContext
+from slamreplay.geometry.covariance import planar_from_ros
 from slamreplay.geometry.times import NS_PER_S
 
 #: Scans that are looked at; the one with the most returns counts.
@@ -29,7 +30,7 @@ class Floor:
 
 
 def sensor_floor(view: BundleView) -> Floor | None:
-    """The floor of this log; None where it has neither map and scans nor tags of known noise.
+    """The floor of this log; None where it has neither map and scans nor sightings and fixes.
 
     A wall in a grid is known to a cell: uniform over its edge r, of variance r^2 / 12. Every beam
     tells the robot's place along the normal of the wall that it meets, with at most that precision,
@@ -40,10 +41,22 @@ def sensor_floor(view: BundleView) -> Floor | None:
     point in the same direction at once; the laser's own noise, which further scans average out
     while the map stays what it is, comes on top and is left out.
 
-    Where there are no map and scans: n sightings of tags of known noise sigma tell the place to
-    sigma / sqrt(n).
+    Sightings of tags and docks and satellite fixes add 1 / sigma^2 each, all of the log as if at
+    once; of headings they leave no floor. Where one of them does not tell its noise there is none.
     """
-    return _of_scans(view) or _of_sightings(view)
+    told = _of_scans(view)
+    table = view.table("references")
+    if not len(table):
+        return told
+    variance = planar_from_ros(table["covariance"])[:, [0, 1], [0, 1]].min(axis=1)
+    if not (variance > 0.0).all():
+        return None
+    information = float(np.sum(1.0 / variance))
+    words = f"what {len(table)} sightings and fixes can tell at best"
+    if told is not None:
+        information += told.position_m**-2
+        words = f"{told.words}, with {len(table)} sightings and fixes"
+    return Floor(information**-0.5, 0.0, words)
 
 
 def _of_scans(view: BundleView) -> Floor | None:
@@ -64,20 +77,6 @@ def _of_scans(view: BundleView) -> Floor | None:
     return Floor(
         float(cell / np.sqrt(beams[fullest])), float(cell / np.sqrt(np.sum(ranges**2))), words
     )
-
-
-def _of_sightings(view: BundleView) -> Floor | None:
-    table = view.table("references")
-    known = np.isfinite(table["covariance"]).all(axis=1)
-    table = table.take(known & np.isin(table["kind"].astype(str), ("fiducial", "dock")))
-    if not len(table):
-        return None
-    variance = table["covariance"].reshape(-1, 6, 6)
-    n = len(table)
-    place = np.minimum(variance[:, 0, 0], variance[:, 1, 1])
-    # Headings have no floor here: two tags far apart tell it better than either one.
-    sigma_m = float(np.sqrt(max(float(place.min()), 0.0) / n))
-    return Floor(sigma_m, 0.0, f"what {n} sightings can tell at best")
 
 
 def below_floor(context: CheckContext) -> list[Stretch]:
