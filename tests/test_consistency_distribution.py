@@ -102,7 +102,7 @@ def test_the_shape_does_not_depend_on_the_scale(k):
 
     assert scaled.p_shape == pytest.approx(one.p_shape, rel=1e-6)
     assert scaled.dispersion == pytest.approx(one.dispersion, rel=1e-6)
-    assert scaled.n_eff == pytest.approx(one.n_eff)  # however small the claimed sigma, as many samples
+    assert scaled.n_eff == pytest.approx(one.n_eff)  # however small sigma is claimed
 
 
 def test_correlated_errors_are_worth_fewer_samples_and_more_than_to_the_mean():
