@@ -6,6 +6,7 @@ from functools import partial
 import numpy as np
 import pytest
 from audited import healthy
+from beliefs import ar1, context
 
 from slamreplay.bundle.findings import Finding
 from slamreplay.consistency import ABOUT_BELIEF, AUDITS, CHECKS
@@ -38,10 +39,18 @@ def remembered(seed):
     return replace(context, innovations=(replace(seen, residual=residual),))
 
 
+def wrong_in_direction(seed):
+    """Twice as far off along one axis as it claims, and half as far along the others."""
+    white = ar1(np.random.default_rng(seed), 2000, 0.5 * (seed % 2), 3)
+    return context(white * [0.5, 2.0, 0.5])
+
+
 #: Of each check about a belief: the finding that names its defect, and a log that has it.
 BELIEF_LINES = {
     "belonging": ("SR-CON-011", torn),
     "collapse": ("SR-CON-010", partial(believed, collapsed=0.1)),
+    "credibility_index": ("SR-CON-005", wrong_in_direction),
+    "distribution": ("SR-CON-004", partial(believed, rows=3000, wild=0.03)),
     "innovation_bias": ("SR-CON-008", partial(believed, bias=0.5)),
     "nees": ("SR-CON-001", partial(believed, rows=3000, told=0.5)),
     "nis": ("SR-CON-006", partial(believed, told=0.5)),

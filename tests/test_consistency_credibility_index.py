@@ -102,12 +102,12 @@ def test_p_values_are_uniform_for_independent_credible_errors():
 
 def test_consistent_errors_are_hardly_ever_accused_even_where_axes_change_at_their_own_pace():
     accused = 0
-    for seed in range(200):
+    for seed in range(100):
         rng = np.random.default_rng([seed, 1])
         white = np.column_stack([ar1(rng, 800, rho, 1) for rho in (0.95, 0.3, 0.8)])
         accused += bool(raised(check(context(white))))
 
-    assert accused <= 2
+    assert accused <= 1
 
 
 def test_without_enough_rows_or_directions_there_is_no_index():

@@ -151,9 +151,9 @@ FINDINGS: dict[str, Explanation] = {
         "Do the ellipses of 50, 68, 90, 95 and 99 % hold as many of the errors as they claim?",
         "u = F(e' P^-1 e) with the chi-square distribution function F, which is uniform where the "
         "covariance is right, against the uniform distribution after Kolmogorov and Smirnov "
-        "(Stephens 1974), for the effective number of samples by the correlation of the ranks. The "
-        "same after the errors were divided by their own scale tells a wrong scale, which "
-        "SR-CON-001 is about, from a wrong shape.",
+        "(Stephens 1974), for the effective number of samples. The same after the errors were "
+        "divided by their own scale tells a wrong scale, which SR-CON-001 is about, from a wrong "
+        "shape.",
         "A constant offset makes all errors alike in size, and so does a reference that is off. "
         "Sources that share evidence with the belief are shown and never accuse.",
     ),

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import chdtrc
 
-from slamreplay.consistency.effective_samples import effective_samples
+from slamreplay.consistency.error_samples import error_samples
 from slamreplay.consistency.mean_test import N_EFF_MIN
 from slamreplay.consistency.whitening import whitened
 from slamreplay.geometry.se2 import Array
@@ -40,7 +40,7 @@ class CredibilityIndex:
             of the whitened errors: P* = L A L' with P = L L'. The identity where P is right.
         p_value: that it is the identity.
         p_direction: that it is a multiple of the identity: off in its scale alone.
-        sufficient: whether there are `N_EFF_MIN` effective samples.
+        sufficient: whether there may be `N_EFF_MIN` effective samples.
     """
 
     n: int
@@ -78,17 +78,17 @@ def credibility_index(white: ArrayLike) -> CredibilityIndex | None:
         return None
     real = whitened(w, np.broadcast_to(actual, (n, m, m)))
     ratio = np.log10(np.sum(w**2, axis=1) / np.sum(real**2, axis=1))
-    n_eff = min(effective_samples(w[:, axis] ** 2) for axis in range(m))
-    p_value, p_direction = _p_values(actual, n_eff)
+    samples = min((error_samples(column[:, None]) for column in w.T), key=lambda s: s.n_eff)
+    p_value, p_direction = _p_values(actual, samples.n_eff)
     return CredibilityIndex(
         n=n,
-        n_eff=n_eff,
+        n_eff=samples.n_eff,
         nci=10.0 * float(np.abs(ratio).mean()),
         inclination=10.0 * float(ratio.mean()),
         actual=actual,
         p_value=p_value,
         p_direction=p_direction,
-        sufficient=n_eff >= N_EFF_MIN,
+        sufficient=samples.n_eff_max >= N_EFF_MIN,
     )
 
 

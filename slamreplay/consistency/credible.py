@@ -13,7 +13,7 @@ LARGE_DB = 3.0
 
 
 def check(context: CheckContext) -> tuple[Suspicion, ...]:
-    """SR-CON-005 from the best source; too few samples are SR-CON-003's.
+    """SR-CON-005 from the best source; that there are too few samples is said by SR-CON-003.
 
     A single axis has one direction only, which SR-CON-001 judges. What shares evidence with the
     belief is not asked: its errors are not the belief's own.

@@ -14,7 +14,7 @@ SHAPE_OFF = 0.1
 
 
 def check(context: CheckContext) -> tuple[Suspicion, ...]:
-    """SR-CON-004 from the best source; too few samples are SR-CON-003's, which counts fewer.
+    """SR-CON-004 from the best source; that there are too few samples is said by SR-CON-003.
 
     What shares evidence with the belief is not asked: its errors are not the belief's own.
     """
