@@ -175,7 +175,8 @@ FINDINGS: dict[str, Explanation] = {
         "against the chi-square without what lies beyond. Rejected ones are counted against the "
         "chance of the gate. Estimators that hand on innovations only, not a recorded localizer.",
         "Whether R or Q is to blame it cannot tell: see SR-CON-007. Scaling both by the factor "
-        "makes S fit. A gate far out of tune lets through what fits it.",
+        "makes S fit. Where SR-CON-007 is raised too, innovations may be small although the "
+        "belief is far too sure of itself. A gate far out of tune lets through what fits it.",
     ),
     "SR-CON-007": Explanation(
         "Innovations hang together in time",
