@@ -180,7 +180,7 @@ FINDINGS: dict[str, Explanation] = {
     ),
     "SR-CON-007": Explanation(
         "Innovations hang together in time",
-        "Is each innovation new, or does it follow from the ones before?",
+        "Is each innovation (those of SR-CON-006) new, or does it follow from the ones before?",
         "Squared autocorrelations of the whitened innovations of each axis at lags 1 to "
         "min(10, n / 5), in order of time, added up as by Ljung and Box (1978, Biometrika 65, "
         "297-303), each over its variance as found, so that a sigma that is wrong for a stretch "
@@ -192,7 +192,7 @@ FINDINGS: dict[str, Explanation] = {
     ),
     "SR-CON-008": Explanation(
         "A sensor measures too much or too little",
-        "Is measured minus predicted zero on average?",
+        "Is measured minus predicted (the innovations of SR-CON-006) zero on average?",
         "Student's t of the mean of each axis, with effective samples (n over the integrated "
         "autocorrelation time) for samples. How grave it is goes by its size in sigmas of the "
         "innovation: below 0.2 it is lost in the noise, however sure it is.",
