@@ -1,13 +1,19 @@
 """The quantile of a scan among those that the particle filter predicts."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.stats import chisquare
 
+from slamreplay.bundle.run import Run, Trial
+from slamreplay.consistency.asking import ask
+from slamreplay.consistency.context import CheckContext
 from slamreplay.estimators.amcl.config import AmclConfig
 from slamreplay.estimators.amcl.estimator import Amcl
 from slamreplay.estimators.amcl.laser import used_beams
 from slamreplay.estimators.amcl.scan_quantile import DRAWS, ScanQuantile
+from slamreplay.estimators.start import OFFSET, ROTATE
 from slamreplay.geometry import se2
 from slamreplay.maps.grid import OccupancyGrid
 from slamreplay.maps.likelihood_field import distance_field
@@ -84,6 +90,22 @@ def test_without_beams_or_walls_there_is_no_traceback():
     assert 0.0 < quantile_of(certain)(*cloud(rng), scan(certain, seen_from(ELSEWHERE))) < 1.0
     deaf = AmclConfig(z_hit=0.0, z_rand=0.0)
     assert np.isnan(quantile_of(deaf)(*cloud(rng), scan(deaf, seen_from(HERE))))
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_a_lost_robots_scans_are_told_and_a_sound_ones_are_not(seed):
+    config = replace(SHARP, alpha1=0.05, alpha2=0.05, alpha3=0.05, alpha4=0.05)
+    view = synthetic_bundle(seconds=25.0).view()
+
+    def asked(evidence):
+        run = Run(Trial("", "amcl", seed), Amcl(config).run(evidence, seed=seed))
+        context = CheckContext.of_run(run, (), view)
+        return [f for f in ask([context], ["scan_likelihood"]) if f.severity != "info"]
+
+    assert asked(view) == []
+    (finding,) = asked(view.with_setting(OFFSET, 2.5).with_setting(ROTATE, 2.0))
+    assert finding.id == "SR-CON-009"
+    assert finding.value > 0.3
 
 
 def test_the_estimate_is_the_same_to_the_bit_without_it():

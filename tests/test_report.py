@@ -12,6 +12,7 @@ import jsonschema
 import numpy as np
 import pytest
 import yaml
+from linear_filter import filters
 from PIL import Image
 
 from slamreplay.bundle.findings import FINDINGS, Finding
@@ -22,10 +23,12 @@ from slamreplay.bundle.track import PoseTrack
 from slamreplay.consistency.nees import nees
 from slamreplay.errors import OutputError
 from slamreplay.maps.map_server import read_map
+from slamreplay.report.assess import not_assessable
 from slamreplay.report.build import build
 from slamreplay.report.evidence import Postmortem, TrialResult
 from slamreplay.report.facts import deciding_facts
 from slamreplay.report.html import html
+from slamreplay.report.innovations import innovations
 from slamreplay.report.junit import junit_xml
 from slamreplay.report.model import SCHEMA_FILE, Report, schema_text
 from slamreplay.report.phrases import bound
@@ -375,6 +378,37 @@ def test_junit_fails_on_errors_and_skips_what_could_not_be_asked(post, bare):
     assert int(suite.get("skipped")) == len(skipped)
     assert int(suite.get("tests")) == len(suite.findall("testcase"))
     assert suite.get("failures") == "0"
+
+
+def test_innovations_stand_beside_what_chance_allows(post, bare):
+    seen = filters(1, bias=0.04)[0]
+    few = replace(seen[1], t_ns=seen[1].t_ns[:9], residual=seen[1].residual[:9], S=seen[1].S[:9])
+    few = replace(few, accepted=np.arange(9) % 3 > 0, source="few")
+    estimate = Estimate(post.belief, (*seen, few))
+    runs = [Run(Trial("b", "ekf", 0), estimate), Run(Trial("b", "ekf", 0, "x", 1.0), estimate)]
+    page = innovations(replace(post, trials=tuple(TrialResult(run) for run in runs)))
+
+    rows = [[cell.text for cell in row] for row in page.rows]
+    assert [row[:5] for row in rows] == [
+        ["ekf", "position", "x", "500", "all"],
+        ["ekf", "position", "y", "500", "all"],
+        ["ekf", "range", "range", "500", "all"],
+        ["ekf", "few", "range", "9", "67 %"],
+    ]
+    assert rows[2][5:] == ["1.11", "0.02", "3.71 cm"]
+    assert [cell.aside for cell in page.rows[2][5:]] == [
+        "chance: 0.87 to 1.14",
+        "chance: within 0.09",
+        "95 %: 2.76 to 4.67",
+    ]
+    assert page.rows[3][3].aside == "too few to judge"
+    assert innovations(post).rows == innovations(bare).rows == ()
+    assert "Is what it measures" not in html(post)
+
+
+def test_what_a_run_leaves_undecided_is_no_reason_for_the_robots_own_belief(post):
+    of_run = Finding("SR-CON-003", "info", "amcl: too few innovations")
+    assert "SR-CON-001" not in not_assessable(replace(post, findings=(of_run,)))
 
 
 def test_numbers_are_tied_to_their_units():

@@ -177,11 +177,12 @@ FINDINGS: dict[str, Explanation] = {
         "against the chi-square without what lies beyond. Rejected ones are counted against the "
         "chance of the gate. Estimators that hand on innovations only, not a recorded localizer.",
         "Whether R or Q is to blame it cannot tell: see SR-CON-007. Scaling both by the factor "
-        "makes S fit. A gate far out of tune lets through what fits it.",
+        "makes S fit. Where SR-CON-007 is raised too, innovations may be small although the "
+        "belief is far too sure of itself. A gate far out of tune lets through what fits it.",
     ),
     "SR-CON-007": Explanation(
         "Innovations hang together in time",
-        "Is each innovation new, or does it follow from the ones before?",
+        "Is each innovation (those of SR-CON-006) new, or does it follow from the ones before?",
         "Squared autocorrelations of the whitened innovations of each axis at lags 1 to "
         "min(10, n / 5), in order of time, added up as by Ljung and Box (1978, Biometrika 65, "
         "297-303), each over its variance as found, so that a sigma that is wrong for a stretch "
@@ -193,7 +194,7 @@ FINDINGS: dict[str, Explanation] = {
     ),
     "SR-CON-008": Explanation(
         "A sensor measures too much or too little",
-        "Is measured minus predicted zero on average?",
+        "Is measured minus predicted (the innovations of SR-CON-006) zero on average?",
         "Student's t of the mean of each axis, with effective samples (n over the integrated "
         "autocorrelation time) for samples. How grave it is goes by its size in sigmas of the "
         "innovation: below 0.2 it is lost in the noise, however sure it is.",

@@ -21,7 +21,10 @@ def not_assessable(post: Postmortem) -> dict[str, str]:
     elif post.nees is None and "SR-CON-001" not in reasons:
         lacks = "no reference" if post.reference is None else "no covariance"
         reasons["SR-CON-001"] = f"{lacks} to measure the belief's errors against"
-    undecided = [f for f in post.findings if f.id == "SR-CON-003"]
+    runs = tuple(f"{result.run.trial.estimator}: " for result in post.trials)
+    undecided = [
+        f for f in post.findings if f.id == "SR-CON-003" and not f.message.startswith(runs)
+    ]
     if undecided:
         reasons.setdefault("SR-CON-001", undecided[0].message)
     if post.judgement.state in ("unobservable", "insufficient_data"):

@@ -13,6 +13,7 @@ from slamreplay.report.assess import not_assessable, title_of
 from slamreplay.report.evidence import Postmortem
 from slamreplay.report.facts import Fact, deciding_facts
 from slamreplay.report.finding_rows import FindingRow, finding_rows
+from slamreplay.report.innovations import innovations
 from slamreplay.report.phrases import percent, seconds
 from slamreplay.report.tables import Table, table
 from slamreplay.report.timeline import Band, bands, marks
@@ -44,6 +45,7 @@ class Page:
     actions: Table
     regions: Table
     trials: Table
+    innovations: Table
     findings: tuple[FindingRow, ...]
     unasked: tuple[tuple[str, str, str], ...]
     missing: tuple[tuple[str, str, str], ...]
@@ -89,6 +91,7 @@ def page(post: Postmortem) -> Page:
         actions=tables.actions(post),
         regions=tables.regions(post),
         trials=tables.trials(post),
+        innovations=innovations(post),
         findings=finding_rows(post),
         unasked=tuple((i, title_of(i), why) for i, why in not_assessable(post).items()),
         missing=tuple((m.part, m.reason, m.consequence) for m in manifest.missing),
