@@ -14,7 +14,7 @@ from slamreplay.estimators import kalman
 from slamreplay.estimators.ekf import kernels
 from slamreplay.estimators.ekf.consensus import locate, window_of
 from slamreplay.estimators.ekf.filter import filtered, gates_of
-from slamreplay.estimators.ekf.motion import steps_between
+from slamreplay.estimators.ekf.motion import Motion
 from slamreplay.estimators.ekf.noise import Noise
 from slamreplay.estimators.start import Start
 from slamreplay.geometry import se2
@@ -102,7 +102,7 @@ def test_noise_of_motion_does_not_depend_on_how_often_odometry_is_sampled():
         xyyaw = np.column_stack([np.linspace(0.0, 3.0, n), np.zeros(n), np.zeros(n)])
         xyyaw = se2.compose([1.0, 2.0, 0.7], xyyaw)
         track = PoseTrack.without_covariance("odom", "base", t_ns, xyyaw)
-        steps = steps_between(track, t_ns[[0, -1]], noise)
+        steps = Motion(track, noise).steps(t_ns[[0, -1]], noise)
 
         q = 0.01 * 3.0
         expected = [[0, 0, 0], [0, q * 9.0 / 3.0, q * 3.0 / 2.0], [0, q * 3.0 / 2.0, q]]
@@ -118,7 +118,7 @@ def test_prediction_over_any_stops_on_the_way_is_the_same(stops):
     ends = [0, len(track) - 1]
     found = []
     for rows in (ends, sorted({*ends, *stops})):
-        steps = steps_between(track, track.t_ns[rows], Noise())
+        steps = Motion(track, Noise()).steps(track.t_ns[rows], Noise())
         x, P = np.array([1.0, 2.0, 0.5]), np.zeros((3, 3))
         for step, Q in zip(steps.xyyaw[1:], steps.Q[1:], strict=True):
             kernels.predict(x, P, step, Q)
@@ -131,11 +131,12 @@ def test_prediction_over_any_stops_on_the_way_is_the_same(stops):
 def test_other_sizes_of_wheels_bend_the_path():
     evidence, _ = world(0, seconds=10.0)
     track = evidence.odometry
-    told = steps_between(track, track.t_ns, Noise()).xyyaw
-    bent = steps_between(track, track.t_ns, Noise(distance_ratio=1.1, turn_ratio=0.9)).xyyaw
+    noise = Noise(distance_ratio=1.1, turn_ratio=0.9, turn_per_metre=0.2)
+    told, bent = (Motion(track, n).steps(track.t_ns, n).xyyaw for n in (Noise(), noise))
 
-    np.testing.assert_allclose(bent[:, 2], 0.9 * told[:, 2], atol=1e-12)
-    np.testing.assert_allclose(np.hypot(*bent[:, :2].T), 1.1 * np.hypot(*told[:, :2].T))
+    length = np.hypot(*told[:, :2].T)
+    np.testing.assert_allclose(np.hypot(*bent[:, :2].T), 1.1 * length, rtol=1e-6)
+    np.testing.assert_allclose(bent[:, 2], 0.9 * told[:, 2] + 0.22 * length, atol=1e-6)
 
 
 @pytest.mark.parametrize("noise", [Noise(), LASTING], ids=["white", "lasting"])

@@ -9,6 +9,7 @@ RANSAC (Fischler and Bolles 1981) over all pairs instead of random ones, for a w
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,10 +49,20 @@ class Window:
     places: se2.Array
     thing: NDArray[np.int64]
 
-    @property
+    @cached_property
     def gates(self) -> se2.Array:
         """(K,) largest squared sigmas of a sighting that agrees."""
         return np.where(np.isfinite(self.headings), _GATE_WITH_HEADING, _GATE)
+
+    @cached_property
+    def whitener(self) -> se2.Array:
+        """(K, 3, 3) inverse Cholesky factors of the covariances, zero for unknown headings."""
+        cov, unknown = self.cov.copy(), ~np.isfinite(self.headings)
+        cov[unknown, 2, :], cov[unknown, :, 2] = 0.0, 0.0
+        cov[unknown, 2, 2] = 1.0
+        out = np.linalg.solve(np.linalg.cholesky(cov), np.eye(3))
+        out[unknown, 2] = 0.0
+        return np.asarray(out)
 
 
 def window_of(
@@ -117,7 +128,7 @@ def locate(window: Window) -> tuple[se2.Array, se2.Array] | None:
     hypotheses = _hypotheses(window)
     if not len(hypotheses):
         return None
-    costs = np.array([_cost(window, pose, 4.0) for pose in hypotheses])
+    costs = _costs(window, hypotheses, 4.0)
     found: list[tuple[float, se2.Array, se2.Array, NDArray[np.bool_]]] = []
     for k in np.argsort(costs, kind="stable"):
         if any(_same(hypotheses[k], pose, cov) for _, pose, cov, _ in found):
@@ -125,7 +136,7 @@ def locate(window: Window) -> tuple[se2.Array, se2.Array] | None:
         refined = _refined(window, hypotheses[k])
         if refined is None or any(_same(refined[0], pose, cov) for _, pose, cov, _ in found):
             continue
-        found.append((_cost(window, refined[0]), *refined))
+        found.append((float(_costs(window, refined[0][None])[0]), *refined))
         if len(found) == _REFINED:
             break
     if not found:
@@ -160,37 +171,36 @@ def _hypotheses(window: Window) -> se2.Array:
     return np.column_stack([place - off, turn[:, 2]])
 
 
-def _residuals(window: Window, pose: se2.Array) -> tuple[se2.Array, se2.Array]:
-    """What is expected less what was seen (K, 3), and its derivative by the pose (K, 3, 3)."""
+def _residuals(window: Window, poses: se2.Array) -> se2.Array:
+    """(H, K, 3) whitened: what is expected from poses (H, 3) less what was seen."""
+    cos, sin = np.cos(poses[:, 2, None]), np.sin(poses[:, 2, None])
+    x, y = (window.places[None, :, i] - poses[:, i, None] for i in (0, 1))
+    yaw = window.places[None, :, 2] - poses[:, 2, None] - window.headings
+    e = np.stack(
+        [
+            cos * x + sin * y - window.points[:, 0],
+            cos * y - sin * x - window.points[:, 1],
+            np.where(np.isfinite(yaw), se2.wrap_angle(yaw), 0.0),
+        ],
+        axis=-1,
+    )
+    return np.asarray(np.einsum("kij,hkj->hki", window.whitener, e))
+
+
+def _derivative(window: Window, pose: se2.Array) -> se2.Array:
+    """(K, 3, 3) of the whitened residuals by the pose (3,)."""
     cos, sin = np.cos(pose[2]), np.sin(pose[2])
-    away = window.places[:, :2] - pose[:2]
-    turn = np.array([[cos, sin], [-sin, cos]])
-    e = np.zeros((len(away), 3))
-    e[:, :2] = away @ turn.T - window.points
-    e[:, 2] = se2.wrap_angle(window.places[:, 2] - pose[2] - window.headings)
-    J = np.zeros((len(away), 3, 3))
-    J[:, :2, :2] = -turn
-    J[:, :2, 2] = away @ np.array([[-sin, cos], [-cos, -sin]]).T
-    J[:, 2, 2] = -1.0
-    unknown = ~np.isfinite(e[:, 2])
-    e[unknown, 2], J[unknown, 2] = 0.0, 0.0
-    return e, J
+    x, y = window.places[:, 0] - pose[0], window.places[:, 1] - pose[1]
+    J = np.zeros((len(x), 3, 3))
+    J[:, :2, :2] = [[-cos, -sin], [sin, -cos]]
+    J[:, 0, 2], J[:, 1, 2], J[:, 2, 2] = cos * y - sin * x, -cos * x - sin * y, -1.0
+    return window.whitener @ J
 
 
-def _whitened(window: Window, pose: se2.Array) -> tuple[se2.Array, se2.Array]:
-    e, J = _residuals(window, pose)
-    cov = window.cov.copy()
-    unknown = ~np.isfinite(window.headings)
-    cov[unknown, 2, :], cov[unknown, :, 2] = 0.0, 0.0
-    cov[unknown, 2, 2] = 1.0
-    L = np.linalg.cholesky(cov)
-    return np.linalg.solve(L, e[:, :, None])[:, :, 0], np.linalg.solve(L, J)
-
-
-def _cost(window: Window, pose: se2.Array, slack: float = 1.0) -> float:
-    """Squared sigmas in all, those that disagree capped; `slack` forgives a rough hypothesis."""
-    e, _ = _whitened(window, pose)
-    return float(np.minimum(np.sum(e**2, axis=1) / slack, window.gates).sum())
+def _costs(window: Window, poses: se2.Array, slack: float = 1.0) -> se2.Array:
+    """(H,) squared sigmas in all, those that disagree capped; `slack` forgives rough poses."""
+    squares = np.sum(_residuals(window, poses) ** 2, axis=-1)
+    return np.asarray(np.minimum(squares / slack, window.gates).sum(axis=1))
 
 
 def _refined(
@@ -199,14 +209,13 @@ def _refined(
     """Pose, covariance and who agrees, by Gauss-Newton; None where too few do."""
     slack = 4.0
     for _ in range(_ROUNDS):
-        e, J = _whitened(window, pose)
+        e, J = _residuals(window, pose[None])[0], _derivative(window, pose)
         agree = np.sum(e**2, axis=1) <= slack * window.gates
-        if agree.sum() < 2:
+        information = np.einsum("kij,kil->jl", J[agree], J[agree])
+        eigenvalues = np.linalg.eigvalsh(information)
+        if eigenvalues[0] <= 1e-12 * eigenvalues[-1]:
             return None
         slack = max(1.0, 0.5 * slack)
-        information = np.einsum("kij,kil->jl", J[agree], J[agree])
-        if np.linalg.cond(information) > 1e12:
-            return None
         step = np.linalg.solve(information, np.einsum("kij,ki->j", J[agree], e[agree]))
         pose = pose - step
         pose[2] = float(se2.wrap_angle(pose[2]))

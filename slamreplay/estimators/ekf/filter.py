@@ -12,7 +12,7 @@ from scipy.special import chdtri
 from slamreplay.bundle.track import PoseTrack
 from slamreplay.estimators.ekf import kernels
 from slamreplay.estimators.ekf.consensus import LEAST_AGREEING, locate, window_of
-from slamreplay.estimators.ekf.motion import Steps, odometry_known, steps_between
+from slamreplay.estimators.ekf.motion import Motion, Steps
 from slamreplay.estimators.ekf.noise import Noise
 from slamreplay.estimators.ekf.observations import Observations
 from slamreplay.estimators.start import Start
@@ -131,6 +131,7 @@ def filtered(
     gates: se2.Array,
     process_scale: float = 1.0,
     measurement_scale: float = 1.0,
+    motion: Motion | None = None,
 ) -> Filtered:
     """One pass over the log.
 
@@ -140,8 +141,10 @@ def filtered(
         gates: (4,) see `gates_of`.
         process_scale: ratio by which the covariance of motion is multiplied.
         measurement_scale: ratio for that of sightings, their lasting errors included.
+        motion: of this odometry without these constant errors, where it is at hand.
     """
-    this = _Pass(evidence, noise, gates, process_scale, measurement_scale)
+    motion = Motion(evidence.odometry, noise) if motion is None else motion
+    this = _Pass(evidence, motion, noise, gates, process_scale, measurement_scale)
     events = this.events
     given = _starts_by_event(evidence.given, events)
     state: _State | None = None
@@ -166,14 +169,15 @@ class _Pass:
     def __init__(
         self,
         evidence: Evidence,
+        motion: Motion,
         noise: Noise,
         gates: se2.Array,
         process_scale: float,
         measurement_scale: float,
     ) -> None:
         seen, N, M = evidence.observations, len(evidence.row_ns), len(evidence.observations)
-        self.evidence, self.noise, self.gates = evidence, noise, gates
-        self.events, self.silent = _events(evidence, noise, process_scale)
+        self.evidence, self.motion, self.noise, self.gates = evidence, motion, noise, gates
+        self.events, self.silent = _events(evidence, motion, noise, process_scale)
         self.process_scale = process_scale
         self.polar = seen.corrected(noise)
         self.R = seen.covariance(noise, measurement_scale)
@@ -237,7 +241,7 @@ class _Pass:
         rows = events.sighting[window]
         if len(rows) < LEAST_AGREEING:
             return None
-        steps = steps_between(self.evidence.odometry, events.t_ns[window], self.noise)
+        steps = self.motion.steps(events.t_ns[window], self.noise)
         R, thing = self.R[rows].copy(), seen.thing[rows]
         # A lasting error is one and the same in all sightings of a thing: they share its weight.
         times = (thing[:, None] == thing[None, :]).sum(axis=1)
@@ -257,14 +261,16 @@ class _Pass:
         return state
 
 
-def _events(evidence: Evidence, noise: Noise, process_scale: float) -> tuple[_Events, int]:
+def _events(
+    evidence: Evidence, motion: Motion, noise: Noise, process_scale: float
+) -> tuple[_Events, int]:
     """Events at which odometry is known, and how many sightings came at other times."""
     M = len(evidence.observations)
     t_ns = np.concatenate([evidence.observations.t_ns, evidence.row_ns])
-    known = odometry_known(evidence.odometry, t_ns, noise)
+    known = motion.known(t_ns, noise)
     order = np.argsort(t_ns, kind="stable")  # at equal times sightings come before rows
     order = order[known[order]]
-    steps = steps_between(evidence.odometry, t_ns[order], noise)
+    steps = motion.steps(t_ns[order], noise)
     events = _Events(
         t_ns[order],
         Steps(steps.xyyaw, process_scale * steps.Q),

@@ -28,84 +28,102 @@ class Steps:
     Q: se2.Array
 
 
-def odometry_known(track: PoseTrack, t_ns: NDArray[np.int64], noise: Noise) -> NDArray[np.bool_]:
-    """(N,) whether odometry says anything of times (N,) on the sightings' clock."""
-    return track.at(t_ns - ns(noise.odometry_delay_s)).has_pose
-
-
-def steps_between(track: PoseTrack, t_ns: NDArray[np.int64], noise: Noise) -> Steps:
-    """Increments of odometry between times, and their covariance.
+class Motion:
+    """The path of odometry, its constant errors removed, with running sums of unit noise.
 
     Noise of the heading is spread evenly along each step and turns all that is driven after it;
     for one straight step of length d with variance q of heading this gives the lateral variance
     q d^2 / 3, the covariance q d / 2 and the heading's q: a Wiener process integrated once
     (Bar-Shalom, Li, Kirubarajan 2001, section 6.2.2). It does not depend on how often odometry is
-    sampled. The sums over the steps between two times are differences of running sums.
+    sampled. What gathers between two times is a difference of running sums over the steps.
 
     Args:
-        track: base in odom.
-        t_ns: (E,) sorted times at which odometry is known (see `odometry_known`).
-        noise: how odometry scatters, its constant errors and its delay.
+        track: base in odom, sorted, every row a pose.
+        noise: of which only the constant errors of odometry count here.
     """
-    if not len(t_ns):
-        return Steps(np.empty((0, 3)), np.empty((0, 3, 3)))
-    at_ns = t_ns - ns(noise.odometry_delay_s)
-    inside = track.t_ns[(track.t_ns > at_ns[0]) & (track.t_ns < at_ns[-1])]
-    t = np.unique(np.concatenate([inside, at_ns]))
-    path = track.at(t)
-    t, xyyaw = t[path.has_pose], path.xyyaw[path.has_pose]
-    xyyaw = _calibrated(xyyaw, noise.distance_ratio, noise.turn_ratio)
-    rows = np.searchsorted(t, at_ns)
 
-    step = np.diff(xyyaw, axis=0, prepend=xyyaw[:1])
-    step[:, 2] = se2.wrap_angle(step[:, 2])
-    length, turn = np.hypot(step[:, 0], step[:, 1]), np.abs(step[:, 2])
-    middle = xyyaw[:, :2] - xyyaw[0, :2] - 0.5 * step[:, :2]
-    q = noise.heading_per_metre**2 * length + noise.heading_per_turn**2 * turn
-    lever, along = _left(middle), _left(step[:, :2])
-    outer = lever[:, :, None] * lever[:, None, :] + along[:, :, None] * along[:, None, :] / 12.0
+    def __init__(self, track: PoseTrack, noise: Noise) -> None:
+        self.track = track
+        path = _calibrated(track.xyyaw, noise)
+        path[:, :2] -= path[:1, :2]  # sums of squares of large places would cancel badly
+        self._path = path
+        self._step = np.diff(path, axis=0)
+        self._step[:, 2] = se2.wrap_angle(self._step[:, 2])
+        moments = np.cumsum(_moments(path[:-1], self._step), axis=0)
+        self._before = np.concatenate([np.zeros_like(moments[:1]), moments])
 
-    s0 = _summed(q, rows)
-    s1 = _summed(q[:, None] * lever, rows)
-    s2 = _summed(q[:, None, None] * outer, rows)
-    s3 = _summed(noise.position_per_metre**2 * length, rows)
-    end = _left(xyyaw[rows, :2] - xyyaw[0, :2])
-    Q = np.zeros((len(rows), 3, 3))
-    cross = end[:, :, None] * s1[:, None, :]
-    Q[:, :2, :2] = (
-        s0[:, None, None] * end[:, :, None] * end[:, None, :]
-        - (cross + np.swapaxes(cross, 1, 2))
-        + s2
-        + s3[:, None, None] * np.eye(2)
+    def known(self, t_ns: NDArray[np.int64], noise: Noise) -> NDArray[np.bool_]:
+        """(N,) whether odometry says anything of times (N,) on the sightings' clock."""
+        return self.track.at(t_ns - ns(noise.odometry_delay_s)).has_pose
+
+    def steps(self, t_ns: NDArray[np.int64], noise: Noise) -> Steps:
+        """Increments between times and their covariance.
+
+        Args:
+            t_ns: (E,) sorted times that are `known`.
+            noise: how odometry scatters, and its delay.
+        """
+        at_ns, t = t_ns - ns(noise.odometry_delay_s), self.track.t_ns
+        k = np.clip(np.searchsorted(t, at_ns, side="right") - 1, 0, max(len(t) - 2, 0))
+        if not len(t_ns) or not len(self._step):
+            return Steps(np.zeros((len(t_ns), 3)), np.zeros((len(t_ns), 3, 3)))
+        share = np.clip((at_ns - t[k]) / (t[k + 1] - t[k]), 0.0, 1.0)[:, None]
+        pose = self._path[k] + share * self._step[k]
+        gathered = self._before[k] + _moments(self._path[k], share * self._step[k])
+        gathered = np.diff(gathered, axis=0, prepend=gathered[:1])
+        before = pose[np.maximum(np.arange(len(pose)) - 1, 0)]
+        Q = _covariance(gathered, _left(pose), noise)
+        return Steps(se2.between(before, pose), turned(Q, -before[:, 2]))
+
+
+def _moments(start: se2.Array, step: se2.Array) -> se2.Array:
+    """(N, 2, 6) of single steps (N, 3) from poses (N, 3): sums of w (1, x, y, x x, x y, y y).
+
+    The weight w is the length, then the size of the turn, spread evenly along the step, and (x, y)
+    the lever of a turn there: how the origin would move.
+    """
+    lever, along = _left(start + 0.5 * step), _left(step)
+    (x, y), (dx, dy) = lever.T, along.T
+    l_ = np.column_stack(
+        [np.ones_like(x), x, y, x * x + dx * dx / 12, x * y + dx * dy / 12, y * y + dy * dy / 12]
     )
-    Q[:, :2, 2] = Q[:, 2, :2] = s0[:, None] * end - s1
-    Q[:, 2, 2] = s0
-    pose = xyyaw[rows]
-    before = pose[np.maximum(np.arange(len(rows)) - 1, 0)]
-    return Steps(se2.between(before, pose), turned(Q, -before[:, 2]))
+    w = np.column_stack([np.hypot(step[:, 0], step[:, 1]), np.abs(step[:, 2])])
+    return np.asarray(w[:, :, None] * l_[:, None, :])
 
 
-def _calibrated(xyyaw: se2.Array, distance_ratio: float, turn_ratio: float) -> se2.Array:
-    """The path (N, 3) integrated anew from increments of other size, from the same pose."""
-    if distance_ratio == 1.0 and turn_ratio == 1.0:
-        return xyyaw
+def _covariance(moments: se2.Array, end: se2.Array, noise: Noise) -> se2.Array:
+    """(E, 3, 3) of motions, in axes of odom, from their moments (E, 2, 6) and end levers (E, 2).
+
+    A turn by e at lever l moves an end at lever m by e (m - l).
+    """
+    q = noise.heading_per_metre**2 * moments[:, 0] + noise.heading_per_turn**2 * moments[:, 1]
+    straight = noise.position_per_metre**2 * moments[:, 0, 0]
+    (x, y), (s, sx, sy, sxx, sxy, syy) = end.T, q.T
+    Q = np.empty((len(q), 3, 3))
+    Q[:, 0, 0] = s * x * x - 2.0 * x * sx + sxx + straight
+    Q[:, 1, 1] = s * y * y - 2.0 * y * sy + syy + straight
+    Q[:, 0, 1] = Q[:, 1, 0] = s * x * y - x * sy - y * sx + sxy
+    Q[:, 0, 2] = Q[:, 2, 0] = s * x - sx
+    Q[:, 1, 2] = Q[:, 2, 1] = s * y - sy
+    Q[:, 2, 2] = s
+    return Q
+
+
+def _calibrated(xyyaw: se2.Array, noise: Noise) -> se2.Array:
+    """The path (N, 3) integrated anew from increments without their constant errors."""
     step = np.diff(xyyaw, axis=0)
-    turn = se2.wrap_angle(step[:, 2])
-    told = xyyaw[:-1, 2] + 0.5 * turn  # heading in the middle of each step
-    yaw = xyyaw[0, 2] + turn_ratio * np.append(0.0, np.cumsum(turn))
-    off = yaw[:-1] + 0.5 * turn_ratio * turn - told
-    cos, sin = distance_ratio * np.cos(off), distance_ratio * np.sin(off)
+    told = se2.wrap_angle(step[:, 2])
+    middle = xyyaw[:-1, 2] + 0.5 * told
+    forward = np.cos(middle) * step[:, 0] + np.sin(middle) * step[:, 1]
+    turn = noise.turn_ratio * told + noise.turn_per_metre * noise.distance_ratio * forward
+    yaw = xyyaw[0, 2] + np.append(0.0, np.cumsum(turn))
+    off = yaw[:-1] + 0.5 * turn - middle
+    cos, sin = noise.distance_ratio * np.cos(off), noise.distance_ratio * np.sin(off)
     x = xyyaw[0, 0] + np.append(0.0, np.cumsum(cos * step[:, 0] - sin * step[:, 1]))
     y = xyyaw[0, 1] + np.append(0.0, np.cumsum(sin * step[:, 0] + cos * step[:, 1]))
-    return np.column_stack([x, y, se2.wrap_angle(yaw)])
+    return np.column_stack([x, y, yaw])
 
 
-def _left(xy: se2.Array) -> se2.Array:
-    """(N, 2) vectors turned by 90 degrees to the left: how a point moves as the heading does."""
-    return np.column_stack([-xy[:, 1], xy[:, 0]])
-
-
-def _summed(values: se2.Array, rows: NDArray[np.int64]) -> se2.Array:
-    """Sums (E, ...) of values (N, ...) after the row before up to each row; zero for the first."""
-    total = np.cumsum(values, axis=0)[rows]
-    return np.concatenate([np.zeros_like(total[:1]), np.diff(total, axis=0)])
+def _left(xyyaw: se2.Array) -> se2.Array:
+    """(N, 2) places turned by 90 degrees to the left: how a point moves as the heading does."""
+    return np.column_stack([-xyyaw[:, 1], xyyaw[:, 0]])

@@ -8,7 +8,7 @@ from math import isfinite
 from slamreplay.errors import UsageError
 
 #: Attributes that may be negative: they are errors with a sign.
-_SIGNED = ("range_offset_m", "bearing_offset_rad", "odometry_delay_s")
+_SIGNED = ("range_offset_m", "bearing_offset_rad", "odometry_delay_s", "turn_per_metre")
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,9 @@ class Noise:
         odometry_delay_s: how long before the robot moves, on the clock of the sightings, odometry
             says that it does; commanded speeds and late cameras are positive.
         distance_ratio: true distance divided by the odometry's.
-        turn_ratio: true turn divided by the odometry's.
+        turn_ratio: true turn divided by the odometry's: a wrong wheel base.
+        turn_per_metre: turn to the left for each metre driven that odometry does not see, rad:
+            wheels of unequal size (Borenstein and Feng 1996, UMBmark, for both).
     """
 
     position_per_metre: float = 0.03
@@ -60,6 +62,7 @@ class Noise:
     odometry_delay_s: float = 0.0
     distance_ratio: float = 1.0
     turn_ratio: float = 1.0
+    turn_per_metre: float = 0.0
 
     def __post_init__(self) -> None:
         for item in fields(self):
