@@ -124,6 +124,33 @@ def test_planar_covariance_becomes_gtsams_by_monte_carlo():
     np.testing.assert_allclose(covariance.planar_from_gtsam(got, 0.7), planar, atol=1e-18)
 
 
+def test_composed_and_parted_poses_have_the_covariance_of_their_samples():
+    """By Monte Carlo at generic poses; errors are about the parent's axes, as ROS has them."""
+    rng = np.random.default_rng(9)
+    roots = [np.tril(rng.normal(size=(3, 3))) * 1e-3 for _ in range(2)]
+    one, two = np.array([3.0, -2.0, 0.7]), np.array([1.3, 2.1, -1.9])
+    cov = [root @ root.T for root in roots]
+    a, b = (x + rng.normal(size=(60_000, 3)) @ r.T for x, r in zip((one, two), roots, strict=True))
+
+    for got, samples in [
+        (covariance.composed(one, cov[0], two, cov[1]), se2.compose(a, b)),
+        (covariance.between(one, cov[0], two, cov[1]), se2.between(a, b)),
+    ]:
+        np.testing.assert_allclose(np.cov(samples.T), got, atol=2e-2 * np.abs(got).max())
+
+
+def test_parting_is_what_composing_was():
+    rng = np.random.default_rng(10)
+    root = rng.normal(size=(4, 3, 3))
+    step, cov = rng.normal(size=(4, 3)), root @ np.swapaxes(root, 1, 2)
+    start, nothing = rng.normal(size=(4, 3)), np.zeros((4, 3, 3))
+    end = se2.compose(start, step)
+
+    got = covariance.between(start, nothing, end, covariance.composed(start, nothing, step, cov))
+
+    np.testing.assert_allclose(got, cov, atol=1e-12)
+
+
 def test_planar_block_is_x_y_and_yaw():
     full = np.arange(36.0)
 

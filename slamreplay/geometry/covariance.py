@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from slamreplay.geometry.se2 import Array
+from slamreplay.geometry.se2 import Array, compose
 
 _PLANAR = np.array([0, 1, 5])
 _ROTATION_FIRST = np.array([3, 4, 5, 0, 1, 2])
@@ -97,6 +97,40 @@ def is_symmetric(covariance: ArrayLike) -> NDArray[np.bool_]:
     return np.asarray(finite & (skew <= 1e-9 * scale))
 
 
+def composed(
+    xyyaw_a_b: ArrayLike, cov_a_b: ArrayLike, xyyaw_b_c: ArrayLike, cov_b_c: ArrayLike
+) -> Array:
+    """Covariances (..., 3, 3) of T_a_c = T_a_b @ T_b_c, about axes of a, of independent poses.
+
+    To first order: the heading error of b swings c about b's origin (the compounding of Smith, Self
+    and Cheeseman, Estimating uncertain spatial relationships in robotics, 1990).
+
+    Args:
+        xyyaw_a_b: (..., 3).
+        cov_a_b: (..., 3, 3) about axes of a.
+        xyyaw_b_c: (..., 3).
+        cov_b_c: (..., 3, 3) about axes of b.
+    """
+    yaw = np.asarray(xyyaw_a_b, dtype=np.float64)[..., 2]
+    swing = _swing(compose(xyyaw_a_b, xyyaw_b_c), xyyaw_a_b)
+    cov = np.asarray(cov_a_b, dtype=np.float64)
+    return swing @ cov @ np.swapaxes(swing, -1, -2) + turned(cov_b_c, yaw)
+
+
+def between(
+    xyyaw_a_b: ArrayLike, cov_a_b: ArrayLike, xyyaw_a_c: ArrayLike, cov_a_c: ArrayLike
+) -> Array:
+    """Covariances (..., 3, 3) of T_b_c = inverse(T_a_b) @ T_a_c about axes of b, to first order.
+
+    Both poses (..., 3) with their covariances (..., 3, 3) about axes of a. They are taken to be
+    independent; of poses whose errors are alike it is more than there is.
+    """
+    yaw = np.asarray(xyyaw_a_b, dtype=np.float64)[..., 2]
+    swing = _swing(xyyaw_a_c, xyyaw_a_b)
+    start = swing @ np.asarray(cov_a_b, dtype=np.float64) @ np.swapaxes(swing, -1, -2)
+    return turned(start + np.asarray(cov_a_c, dtype=np.float64), -yaw)
+
+
 def is_positive_definite(covariance: ArrayLike) -> NDArray[np.bool_]:
     """Which of the matrices (..., n, n) are finite, symmetric and positive definite, as a mask."""
     cov = np.asarray(covariance, dtype=np.float64)
@@ -110,6 +144,15 @@ def _block_diagonal(R: Array) -> Array:
     out = np.zeros((*R.shape[:-2], 6, 6))
     out[..., :3, :3] = R
     out[..., 3:, 3:] = R
+    return out
+
+
+def _swing(xyyaw_a_c: ArrayLike, xyyaw_a_b: ArrayLike) -> Array:
+    """(..., 3, 3) how an error of b moves c, which b carries, in axes of a."""
+    step = np.asarray(xyyaw_a_c, dtype=np.float64) - np.asarray(xyyaw_a_b, dtype=np.float64)
+    out = np.zeros((*step.shape[:-1], 3, 3))
+    out[..., 0, 0] = out[..., 1, 1] = out[..., 2, 2] = 1.0
+    out[..., 0, 2], out[..., 1, 2] = -step[..., 1], step[..., 0]
     return out
 
 
