@@ -31,6 +31,27 @@ def ros_from_planar(covariance: ArrayLike) -> Array:
     return full.reshape((*block.shape[:-2], 36))
 
 
+def ros_turned(covariance: ArrayLike, R_to_from: ArrayLike) -> Array:
+    """ROS covariances (..., 6, 6) seen from axes that R_to_from (3, 3) leads to.
+
+    Both parts are turned; the frame's origin does not matter, for errors are differences. An entry
+    is NaN only where one that is NaN takes part in it: who turns about z keeps x and y of a pose
+    whose height was never told.
+
+    Args:
+        covariance: (..., 36) or (..., 6, 6) about the old axes.
+        R_to_from: (3, 3).
+    """
+    full = np.asarray(covariance, dtype=np.float64)
+    full = full.reshape((*full.shape[:-1], 6, 6)) if full.shape[-1] == 36 else full
+    turn = _block_diagonal(np.asarray(R_to_from, dtype=np.float64))
+    part = (np.abs(turn) > 1e-9).astype(np.float64)
+    missing = np.isnan(full)
+    out = turn @ np.where(missing, 0.0, full) @ turn.T
+    out[part @ missing @ part.T > 0.0] = np.nan
+    return out
+
+
 def gtsam_from_ros(covariance: ArrayLike, R_parent_body: ArrayLike) -> Array:
     """Gtsam Pose3 covariances (..., 6, 6) from ROS ones (..., 6, 6) and the pose's rotation.
 
@@ -112,9 +133,9 @@ def composed(
         cov_b_c: (..., 3, 3) about axes of b.
     """
     yaw = np.asarray(xyyaw_a_b, dtype=np.float64)[..., 2]
-    swing = _swing(compose(xyyaw_a_b, xyyaw_b_c), xyyaw_a_b)
+    by = swing(compose(xyyaw_a_b, xyyaw_b_c), xyyaw_a_b)
     cov = np.asarray(cov_a_b, dtype=np.float64)
-    return swing @ cov @ np.swapaxes(swing, -1, -2) + turned(cov_b_c, yaw)
+    return by @ cov @ np.swapaxes(by, -1, -2) + turned(cov_b_c, yaw)
 
 
 def between(
@@ -126,9 +147,18 @@ def between(
     independent; of poses whose errors are alike it is more than there is.
     """
     yaw = np.asarray(xyyaw_a_b, dtype=np.float64)[..., 2]
-    swing = _swing(xyyaw_a_c, xyyaw_a_b)
-    start = swing @ np.asarray(cov_a_b, dtype=np.float64) @ np.swapaxes(swing, -1, -2)
+    by = swing(xyyaw_a_c, xyyaw_a_b)
+    start = by @ np.asarray(cov_a_b, dtype=np.float64) @ np.swapaxes(by, -1, -2)
     return turned(start + np.asarray(cov_a_c, dtype=np.float64), -yaw)
+
+
+def swing(xyyaw_a_c: ArrayLike, xyyaw_a_b: ArrayLike) -> Array:
+    """Derivatives (..., 3, 3) of T_a_c by T_a_b, which carries c, both (..., 3) in axes of a."""
+    step = np.asarray(xyyaw_a_c, dtype=np.float64) - np.asarray(xyyaw_a_b, dtype=np.float64)
+    out = np.zeros((*step.shape[:-1], 3, 3))
+    out[..., 0, 0] = out[..., 1, 1] = out[..., 2, 2] = 1.0
+    out[..., 0, 2], out[..., 1, 2] = -step[..., 1], step[..., 0]
+    return out
 
 
 def is_positive_definite(covariance: ArrayLike) -> NDArray[np.bool_]:
@@ -144,15 +174,6 @@ def _block_diagonal(R: Array) -> Array:
     out = np.zeros((*R.shape[:-2], 6, 6))
     out[..., :3, :3] = R
     out[..., 3:, 3:] = R
-    return out
-
-
-def _swing(xyyaw_a_c: ArrayLike, xyyaw_a_b: ArrayLike) -> Array:
-    """(..., 3, 3) how an error of b moves c, which b carries, in axes of a."""
-    step = np.asarray(xyyaw_a_c, dtype=np.float64) - np.asarray(xyyaw_a_b, dtype=np.float64)
-    out = np.zeros((*step.shape[:-1], 3, 3))
-    out[..., 0, 0] = out[..., 1, 1] = out[..., 2, 2] = 1.0
-    out[..., 0, 2], out[..., 1, 2] = -step[..., 1], step[..., 0]
     return out
 
 
