@@ -69,7 +69,7 @@ def postmortem(
     context = CheckContext(belief, references, view)
     best = context.reference
     reference, kind = (None, None) if best is None else (best.track, best.kind)
-    findings = [*judgement.findings, *unused_references(bundle)]
+    findings = [*judgement.findings, *unused_references(bundle, context.updates)]
     findings += sensed_references(bundle, found, hold_out)
     undisturbed = (run for run in runs if run.trial.perturbation is None)
     findings += ask([context, *(CheckContext.of_run(run, references, view) for run in undisturbed)])

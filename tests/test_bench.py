@@ -15,9 +15,10 @@ from slamreplay.bench.incidents import KINDS
 from slamreplay.bench.measure import Measured, measured
 from slamreplay.bench.rates import auc, best_f1, f1, share
 from slamreplay.bench.schedule import DEFAULT_LOGS, HELD_FROM, Case, schedule
-from slamreplay.bench.scores import calibration, named, scores
+from slamreplay.bench.scores import calibration, hindsight_size, named, scores
 from slamreplay.bench.store import read_measured, write_measured
 from slamreplay.bench.table import page
+from slamreplay.consistency.hindsight_size import hindsight_size_of, measured_hindsight_size
 from slamreplay.errors import OutputError, UsageError
 from slamreplay.verdict.reliability import measured_reliability, reliability_of
 
@@ -247,7 +248,11 @@ def test_command_prints_the_tables(tmp_path, monkeypatch):
     from slamreplay.cli.main import COMMANDS, app
 
     assert "bench" in COMMANDS
-    monkeypatch.setattr(runner, "measured", lambda case: replace(made_up(), case=case))
+    monkeypatch.setattr(
+        runner,
+        "measured",
+        lambda case: replace(made_up(nees_xy=np.full(N, 8.0), nees_yaw=np.ones(N)), case=case),
+    )
     from slamreplay.cli import bench
 
     if not any(g.name == "bench" for g in app.registered_groups):
@@ -264,6 +269,8 @@ def test_command_prints_the_tables(tmp_path, monkeypatch):
     record = reliability_of(json.loads((target / "reliability.json").read_text()))
     assert record.logs == 30
     assert record.moments > 1000
+    size = hindsight_size_of(json.loads((target / "hindsight_size.json").read_text()))
+    assert (size.logs, size.split, size.position, size.heading) == (30, "held", 2.0, 1.0)
     assert (target / "reliability.svg").read_bytes().startswith(b"<?xml")
 
     refused = CliRunner().invoke(app, [*words, "--at-least", "calibration.ece=0.5"])
@@ -303,6 +310,33 @@ def test_goal_without_a_number_is_refused(text):
 def test_goal_for_a_figure_that_is_not_there_is_refused(name):
     with pytest.raises(UsageError):
         missed(scores([made_up()]), parse_goals([f"{name}=0.5"], ">="))
+
+
+def test_hindsights_size_counts_each_log_alike(tmp_path):
+    rng = np.random.default_rng(4)
+    logs = [
+        made_up(seed=k, nees_xy=xy * rng.chisquare(2, N), nees_yaw=yaw * rng.chisquare(1, N))
+        for k, (xy, yaw) in enumerate([(1.0, 0.25), (1.0, 0.25), (9.0, 0.25)])
+    ]
+    logs[0].moments["nees_xy"][: N // 2] = np.nan  # no place there
+    size = hindsight_size([*logs, made_up(seed=9)], 3, "train")
+
+    assert (size.logs, size.seed, size.split) == (3, 3, "train")
+    assert size.position == pytest.approx(np.sqrt((1.0 + 1.0 + 9.0) / 3.0), rel=0.1)
+    assert size.typical_position == pytest.approx(1.0, rel=0.1)
+    assert size.heading == pytest.approx(0.5, rel=0.1)
+    assert hindsight_size([made_up()], 3, "train") is None
+    write_measured(tmp_path, logs[1], "code")
+    kept = read_measured(tmp_path, logs[1].case, "code")
+    np.testing.assert_array_equal(kept.moments["nees_xy"], logs[1].moments["nees_xy"])
+
+
+def test_shipped_size_of_hindsight_was_measured_on_logs_to_develop_with():
+    size = measured_hindsight_size()
+
+    assert size.split == "train"
+    assert size.logs >= 40
+    assert hindsight_size_of(json.loads(json.dumps(size.as_json()))) == size
 
 
 def test_shipped_reliability_was_measured_on_many_moments():

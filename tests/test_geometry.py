@@ -124,6 +124,55 @@ def test_planar_covariance_becomes_gtsams_by_monte_carlo():
     np.testing.assert_allclose(covariance.planar_from_gtsam(got, 0.7), planar, atol=1e-18)
 
 
+def test_composed_and_parted_poses_have_the_covariance_of_their_samples():
+    """By Monte Carlo at generic poses; errors are about the parent's axes, as ROS has them."""
+    rng = np.random.default_rng(9)
+    roots = [np.tril(rng.normal(size=(3, 3))) * 1e-3 for _ in range(2)]
+    one, two = np.array([3.0, -2.0, 0.7]), np.array([1.3, 2.1, -1.9])
+    cov = [root @ root.T for root in roots]
+    a, b = (x + rng.normal(size=(60_000, 3)) @ r.T for x, r in zip((one, two), roots, strict=True))
+
+    for got, samples in [
+        (covariance.composed(one, cov[0], two, cov[1]), se2.compose(a, b)),
+        (covariance.between(one, cov[0], two, cov[1]), se2.between(a, b)),
+    ]:
+        np.testing.assert_allclose(np.cov(samples.T), got, atol=2e-2 * np.abs(got).max())
+
+
+def test_parting_is_what_composing_was():
+    rng = np.random.default_rng(10)
+    root = rng.normal(size=(4, 3, 3))
+    step, cov = rng.normal(size=(4, 3)), root @ np.swapaxes(root, 1, 2)
+    start, nothing = rng.normal(size=(4, 3)), np.zeros((4, 3, 3))
+    end = se2.compose(start, step)
+
+    got = covariance.between(start, nothing, end, covariance.composed(start, nothing, step, cov))
+
+    np.testing.assert_allclose(got, cov, atol=1e-12)
+
+
+def test_turned_ros_covariances_are_those_of_turned_errors():
+    """By samples through a generic rotation; what is not told spoils only what it takes part in."""
+    rng = np.random.default_rng(11)
+    root = np.tril(rng.normal(size=(6, 6)))
+    ros = root @ root.T
+    R = se3.rotation_matrix(np.array([0.2, -0.4, 0.5, 0.7]))
+    errors = rng.normal(size=(50_000, 6)) @ root.T
+    moved = np.column_stack([errors[:, :3] @ R.T, errors[:, 3:] @ R.T])
+
+    got = covariance.ros_turned(ros.reshape(36), R)
+
+    np.testing.assert_allclose(np.cov(moved.T), got, atol=2e-2 * np.abs(got).max())
+    level = se3.from_planar(np.array([0.0, 0.0, 0.7]))[:3, :3]
+    ros[2] = ros[:, 2] = np.nan
+    planar = covariance.planar_from_ros(ros)
+    np.testing.assert_allclose(
+        covariance.planar_from_ros(covariance.ros_turned(ros, level)),
+        covariance.turned(planar, 0.7),
+    )
+    assert np.isnan(covariance.ros_turned(ros, R)).any(axis=0)[:3].all()
+
+
 def test_planar_block_is_x_y_and_yaw():
     full = np.arange(36.0)
 
@@ -210,3 +259,19 @@ def test_two_parents_and_cycles_are_named():
 def test_unconnected_frames_are_named():
     with pytest.raises(TransformError, match="no transform between 'map' and 'base'"):
         TransformBuffer([edge("odom", "base", [0, 0, 0])]).lookup("map", "base", np.zeros(1))
+
+
+def test_only_static_edges_are_fixed():
+    buffer = TransformBuffer([
+        edge("earth", "map", [1.0, 2.0, 0.4], is_static=True),
+        edge("map", "tag", [3.0, -1.0, 1.2], is_static=True),
+        edge("map", "odom", [[0, 0, 0], [2, 0, 0.2]], (100, 200)),
+    ])  # fmt: skip
+
+    found = buffer.fixed("earth", "tag")
+
+    expected = se2.compose(np.array([1.0, 2.0, 0.4]), np.array([3.0, -1.0, 1.2]))
+    np.testing.assert_allclose(se3.planar(found), expected)
+    assert buffer.fixed("map", "odom") is None
+    assert buffer.fixed("map", "elsewhere") is None
+    np.testing.assert_array_equal(buffer.fixed("odom", "odom"), np.eye(4))

@@ -1,6 +1,7 @@
 """One log in, one post-mortem out: the stages meet, and the judging reference only judges."""
 
 import json
+from dataclasses import replace
 from itertools import pairwise
 
 import jsonschema
@@ -8,12 +9,15 @@ import numpy as np
 import pytest
 
 from slamreplay.bundle.run import Estimate, Run, Trial
+from slamreplay.bundle.schema import TABLES
 from slamreplay.bundle.tables import Table
 from slamreplay.bundle.track import PoseTrack
 from slamreplay.bundle.view import Bundle
 from slamreplay.postmortem import belief_times, postmortem
+from slamreplay.report.assess import not_assessable
 from slamreplay.report.build import build
 from slamreplay.report.model import schema_text
+from slamreplay.testing.edits import rebuilt
 from slamreplay.testing.synthetic import START_NS, room_grid, synthetic_bundle, true_path
 
 
@@ -45,6 +49,23 @@ def test_nees_is_measured_against_the_logs_own_reference(lost):
     assert post.nees.summary("joint").test.mean > 100.0
     said = [f.message for f in post.findings if f.id.startswith("SR-CON-0")]
     assert any("against simulation" in message for message in said)
+
+
+def test_a_reference_that_was_not_used_does_not_undo_what_another_one_told():
+    bundle = synthetic_bundle(seconds=20.0, with_map=False)
+    table = bundle.table("references")
+    elsewhere = table.replace(
+        topic=np.full(len(table), "/mocap", dtype=object),
+        frame_id=np.full(len(table), "lab", dtype=object),
+    )
+    both = rebuilt(bundle, {"references": Table.concat(TABLES["references"], [table, elsewhere])})
+    post = postmortem(both)
+
+    assert any("/mocap was not used" in f.message for f in post.findings)
+    post = replace(post, findings=tuple(f for f in post.findings if f.id == "SR-CON-003"))
+    assert "SR-CON-001" not in not_assessable(post)
+    unknown = replace(post, reference_kind="hindsight")
+    assert "/mocap" in not_assessable(unknown)["SR-CON-001"]
 
 
 def test_findings_come_worst_first(lost):

@@ -19,6 +19,7 @@ from slamreplay.bundle.products import ChangedRegion, Hindsight
 from slamreplay.bundle.scans import scan_set
 from slamreplay.bundle.track import PoseTrack
 from slamreplay.bundle.view import BundleView
+from slamreplay.consistency.whitening import whitened
 from slamreplay.geometry import se2
 from slamreplay.geometry.times import ns
 from slamreplay.hindsight.pipeline import hindsight
@@ -51,8 +52,9 @@ def measured(case: Case) -> Measured:
     """Play a case through all stages.
 
     Moments: t_s; lost, changed by truth; judged_lost, judged_changed; unjudged; confidence of the
-    interval; error_m, error_rad of hindsight; ratio (how far and long the belief is from hindsight,
-    in limits of lost); changed_share by truth and by hindsight; the baselines' scores.
+    interval; error_m, error_rad, nees_xy, nees_yaw of hindsight; ratio (how far and long the belief
+    is from hindsight, in limits of lost); changed_share by truth and by hindsight; the baselines'
+    scores.
     """
     made = incident(case.kind, case.seed, case.conditions)
     bundle, truth = bundle_of(made)
@@ -110,8 +112,12 @@ def _hindsight_error(found: Hindsight | None, truth: Truth) -> dict[str, NDArray
     """Against where the scans were really taken; late stamps are the verdict's business."""
     nothing = np.full(len(truth.t_ns), np.nan)
     if found is None or not len(found.track):
-        return {"error_m": nothing, "error_rad": nothing, "judged_share": nothing}
-    step = found.track.at(truth.t_ns).xyyaw - truth.xyyaw_taken
+        names = ("error_m", "error_rad", "nees_xy", "nees_yaw", "judged_share")
+        return dict.fromkeys(names, nothing)
+    at = found.track.at(truth.t_ns)
+    step = at.xyyaw - truth.xyyaw_taken
+    step[:, 2] = se2.wrap_angle(step[:, 2])
+    white = [whitened(step[:, axes], at.cov[:, axes, axes]) for axes in (slice(2), slice(2, 3))]
     share = nothing
     if found.changes is not None and len(found.changes.t_ns):
         order = np.argsort(found.changes.t_ns, kind="stable")
@@ -119,7 +125,9 @@ def _hindsight_error(found: Hindsight | None, truth: Truth) -> dict[str, NDArray
         share = shares[np.clip(np.searchsorted(t_ns, truth.t_ns), 0, len(t_ns) - 1)]
     return {
         "error_m": np.hypot(step[:, 0], step[:, 1]),
-        "error_rad": np.abs(se2.wrap_angle(step[:, 2])),
+        "error_rad": np.abs(step[:, 2]),
+        "nees_xy": np.sum(white[0] ** 2, axis=1),
+        "nees_yaw": np.sum(white[1] ** 2, axis=1),
         "judged_share": share,
     }
 

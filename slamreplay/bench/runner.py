@@ -18,7 +18,7 @@ from slamreplay.bench.failures import write_case
 from slamreplay.bench.incidents import KINDS
 from slamreplay.bench.measure import Measured, measured
 from slamreplay.bench.schedule import Case, Split, schedule
-from slamreplay.bench.scores import is_right, named, scores
+from slamreplay.bench.scores import hindsight_size, is_right, named, scores
 from slamreplay.bench.store import fingerprint, read_measured, write_measured
 from slamreplay.bench.table import page
 from slamreplay.bundle.atomic import check_target, write_file
@@ -29,6 +29,8 @@ from slamreplay.verdict.reliability import Bin, Reliability
 
 RESULTS, PAGE, LOGS, FAILURES = "results.json", "results.md", "logs", "failures"
 RELIABILITY, DIAGRAM = "reliability.json", "reliability.svg"
+#: The record that `slamreplay.consistency.hindsight_size` ships with, from logs to develop with.
+HINDSIGHT_SIZE = "hindsight_size.json"
 #: Kinds that are a hard condition by themselves.
 _HARD_KINDS = ("half_changed",)
 
@@ -75,6 +77,10 @@ def run_benchmark(
     results = results_of(found, seed, split)
     write_file(target / PAGE, page(results).encode())
     _write_reliability(target, results)
+    size = hindsight_size(found, seed, split)
+    if size is not None:
+        text = json.dumps(size.as_json(), indent=1, allow_nan=False)
+        write_file(target / HINDSIGHT_SIZE, (text + "\n").encode())
     text = json.dumps(results, indent=1, allow_nan=False, sort_keys=True)
     write_file(target / RESULTS, text.encode())
     wrong = [m.case for m in found if reports and not is_right(m) and "error" not in m.facts]

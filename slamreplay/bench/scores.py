@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from slamreplay.bench.baselines import FIELD_THRESHOLDS
 from slamreplay.bench.measure import Measured
 from slamreplay.bench.rates import Rate, auc, best_f1, clustered, f1, share
+from slamreplay.consistency.hindsight_size import HindsightSize
 from slamreplay.verdict.reliability import Bin
 
 FOUR = ("healthy", "lost", "map_changed", "lost_and_map_changed")
@@ -263,3 +264,17 @@ def _log_ece(said: Sequence[tuple[float, bool]]) -> float | None:
     at = np.minimum((p * _BINS).astype(np.int64), _BINS - 1)
     gap = np.bincount(at, p, _BINS) - np.bincount(at, ok, _BINS)
     return float(np.abs(gap).sum() / len(p))
+
+
+def hindsight_size(logs: Sequence[Measured], seed: int, split: str) -> HindsightSize | None:
+    """How much too small hindsight's own sigma was; None where no log had a place."""
+    factors = []
+    for m in logs:
+        values = [m.moments.get(name) for name in ("nees_xy", "nees_yaw")]
+        told = [v[np.isfinite(v)] for v in values if v is not None]
+        if len(told) == 2 and all(len(v) for v in told):
+            factors.append([float(told[0].mean()) / 2.0, float(told[1].mean())])
+    if not factors:
+        return None
+    mean, middle = np.sqrt(np.mean(factors, axis=0)), np.sqrt(np.median(factors, axis=0))
+    return HindsightSize(len(factors), seed, split, *mean.tolist(), *middle.tolist())

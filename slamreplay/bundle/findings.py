@@ -124,14 +124,20 @@ FINDINGS: dict[str, Explanation] = {
     "SR-CON-001": Explanation(
         "The covariance does not match the error",
         "Is the normalised estimation error squared what a consistent estimator would show?",
-        "NEES e' (P + P_ref)^-1 e per row, e = belief minus reference in x, y and wrapped yaw; its "
-        "mean against the chi-square interval for the effective number of samples (Bar-Shalom, "
-        "Li, Kirubarajan 2001, section 5.4), too small and too large alike. Where position and "
-        "heading are not coupled, as in AMCL, they are judged apart; a heading whose variance is "
-        "beyond pi^2 / 3, uniform over the circle, is not known and left out.",
-        "A reference that shares evidence with the belief, as hindsight does, can show "
-        "over-confidence and never proves consistency. AMCL's mean and covariance may come from "
-        "different clusters: SR-CON-011 where the log has its particles.",
+        "NEES e' (P + P_source)^-1 e of every update of the belief, its mean against the 95 % "
+        "interval for the effective number of samples (Bar-Shalom, Li, Kirubarajan 2001, section "
+        "5.4), too small and too large alike, one test for each source: poses of a reference; tags "
+        "and docks with a surveyed place, and satellite fixes tied to the map, to which the belief "
+        "carries what was sensed; tags, docks and charging against where they were at the visits "
+        "before. Where no reference tells, hindsight and a second odometry, against which only a "
+        "factor of 2 counts. Where position and heading are not coupled, as in AMCL, they are "
+        "judged apart; a heading whose variance is beyond pi^2 / 3, uniform over the circle, is "
+        "not known and left out.",
+        "Of all sources but poses of a reference the covariance is only a bound: sigma may be "
+        "found too small, by at least the factor, and never right or too large. A tag that was "
+        "moved, one whose heading flips, a camera whose mount is off, or charging by hand looks "
+        "like an error of the belief. AMCL's mean and covariance may come from different clusters: "
+        "SR-CON-011 where the log has its particles.",
     ),
     "SR-CON-002": Explanation(
         "Covariances that are none",
@@ -142,8 +148,9 @@ FINDINGS: dict[str, Explanation] = {
     "SR-CON-003": Explanation(
         "Consistency could not be decided",
         "Was there enough independent evidence to hold the covariance against an error?",
-        "Refused without a reference or a covariance, in different frames, or below 20 effective "
-        "samples (n over the integrated autocorrelation time of the NEES series).",
+        "Refused without a source or a covariance, in frames that nothing independent ties, where "
+        "the belief is made of what it would be held against, or below 20 effective samples. A "
+        "source whose covariance is only a bound decides nothing where it accuses nobody.",
         "Undecided is neither consistent nor inconsistent.",
     ),
     "SR-CON-004": Explanation(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from slamreplay.bundle.tables import Table
 from slamreplay.bundle.track import PoseTrack
 from slamreplay.bundle.view import BundleView
 from slamreplay.geometry import se2, se3
@@ -29,8 +30,12 @@ def odometry_track(view: BundleView) -> PoseTrack | None:
                 frames.odom, frames.base, t_ns[valid][keep], xyyaw[keep]
             )
     table = view.role("odometry")
-    if table is None or not len(table):
-        return None
+    return None if table is None or not len(table) else topic_track(view, table)
+
+
+def topic_track(view: BundleView, table: Table) -> PoseTrack:
+    """The base by the rows of one topic of table odometry, sorted by time."""
+    frames = view.manifest.frames
     yaw = se3.yaw_from_quaternion(table["orientation_xyzw"])
     xyyaw = np.column_stack([table["position_xyz"][:, :2], yaw])
     child = str(table["child_frame_id"][0])

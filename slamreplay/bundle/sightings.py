@@ -130,10 +130,9 @@ def _surveys(
     """T_map_thing (4, 4) of things that static transforms tie to the map."""
     found = {}
     for name, frame in sorted(set(zip(names, table["child_frame_id"], strict=True))):
-        if map_frame and frame in buffer.edges and buffer.has_path(map_frame, frame):
-            path = buffer.path(map_frame, frame)
-            if path and all(edge.is_static for edge in path):
-                found[name] = buffer.lookup(map_frame, frame, table.t_ns[:1])[0][0]
+        T = buffer.fixed(map_frame, frame) if map_frame and frame in buffer.edges else None
+        if T is not None:
+            found[name] = T
     return found
 
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from slamreplay.audit.log_audit import LogAudit
 from slamreplay.bundle.run import Innovations, Run
+from slamreplay.bundle.schema import SENSED_KINDS
 from slamreplay.bundle.track import PoseTrack
 from slamreplay.bundle.view import BundleView
 from slamreplay.consistency.belonging import (
@@ -72,7 +73,8 @@ class CheckContext:
         """The updates' errors against each source that can tell, the best first."""
         if self.updates is None:
             return ()
-        return evidence_of(self.updates, self.references, self.left_out)
+        used = {kind for kind in SENSED_KINDS for i in self.innovations if kind in i.source}
+        return evidence_of(self.updates, self.references, self.view, used, self.left_out)
 
     @cached_property
     def belonging(self) -> Belonging | None:

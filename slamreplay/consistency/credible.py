@@ -16,11 +16,12 @@ def check(context: CheckContext) -> tuple[Suspicion, ...]:
     """SR-CON-005 from the best source; that there are too few samples is said by SR-CON-003.
 
     A single axis has one direction only, which SR-CON-001 judges. What shares evidence with the
-    belief is not asked: its errors are not the belief's own.
+    belief, or has only a bound of a covariance, is not asked: its errors are not distributed as it
+    claims.
     """
-    if context.updates is None or not context.evidence or context.evidence[0].shared:
+    evidence = next((e for e in context.evidence if e.is_exact), None)
+    if context.updates is None or evidence is None:
         return ()
-    evidence = context.evidence[0]
     answers = []
     for part in judged_parts(evidence, context.updates):
         found = credibility_index(part.white(evidence)) if len(part.axes) > 1 else None

@@ -14,6 +14,9 @@ from slamreplay.geometry.se2 import Array
 #: of itself, and never that its covariance is right.
 SHARED_KINDS = frozenset({"hindsight", "second_odometry"})
 
+#: Axes of errors in the map's frame, position first; of a thing that has no heading the first two.
+MAP_AXES = ("x m", "y m", "yaw rad")
+
 
 @dataclass(frozen=True, eq=False)
 class Reference:
@@ -40,6 +43,12 @@ class Evidence:
         error: (N, m) belief minus source in `axes`; NaN rows where either is missing.
         cov: (N, m, m) claimed for it: the belief's, projected, plus the source's own.
         axes: names and units of the m components.
+        at_most: why `cov` is more than the errors can have: a sensor's noise was taken at its usual
+            most, or errors that share a cause were added up. Such evidence may show that a belief
+            is too sure of itself, and neither the reverse nor that it is right. Empty where `cov`
+            is what is claimed.
+        note: what else a reader of its numbers must know; may be empty.
+        refusal: why there are no errors although the source is there; empty where there are.
     """
 
     source: str
@@ -48,8 +57,23 @@ class Evidence:
     error: Array
     cov: Array
     axes: tuple[str, ...]
+    at_most: str = ""
+    note: str = ""
+    refusal: str = ""
+
+    @classmethod
+    def refused(cls, source: str, kind: str, why: str) -> Evidence:
+        """A source that is there and cannot be used."""
+        none = np.empty(0, dtype=np.int64)
+        return cls(source, kind, none, np.empty((0, 2)), np.empty((0, 2, 2)), MAP_AXES[:2],
+                   refusal=why)  # fmt: skip
 
     @property
     def shared(self) -> bool:
         """Whether it is made of evidence that the belief used too."""
         return self.kind in SHARED_KINDS
+
+    @property
+    def is_exact(self) -> bool:
+        """Whether errors of a belief that is right have `cov`, neither less nor more."""
+        return not (self.shared or self.at_most or self.refusal)

@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from slamreplay.bundle.odometry import odometry_track
 from slamreplay.bundle.track import PoseTrack
 from slamreplay.bundle.view import BundleView
-from slamreplay.consistency.evidence import Evidence, Reference
+from slamreplay.consistency.charging import charging
+from slamreplay.consistency.evidence import MAP_AXES, Evidence, Reference
+from slamreplay.consistency.hindsight_size import inflated, measured_hindsight_size
 from slamreplay.consistency.nees import nees
 from slamreplay.consistency.published import fresh_rows, published_belief
+from slamreplay.consistency.satellites import satellites
+from slamreplay.consistency.second_odometry import second_odometry
+from slamreplay.consistency.sighted import sighted
 from slamreplay.geometry.se2 import Array
 
 
@@ -39,20 +46,63 @@ def updates_of(
 def evidence_of(
     updates: PoseTrack,
     references: tuple[Reference, ...],
+    view: BundleView,
+    used: Collection[str] = (),
     left_out: NDArray[np.bool_] | None = None,
 ) -> tuple[Evidence, ...]:
-    """The errors of the updates (N rows) against every source, the best first.
+    """The errors of the updates (N rows) against every source that is not the belief's own.
 
-    Those of rows (N,) that are left out are NaN: their mean and covariance part.
+    Independent ones first, the best of them first; then those that share evidence with the belief.
+
+    Args:
+        updates: see `updates_of`.
+        references: poses of the base, the best first.
+        view: the log; what was held out of hindsight judges the belief all the same.
+        used: kinds of references that the belief is known to be made of: they say nothing of it.
+        left_out: (N,) updates whose mean and covariance part: no error is held against them, and
+            those against a reference are NaN.
     """
-    return tuple(_against(updates, reference, left_out) for reference in references)
+    view = replace(view, held_out=frozenset())
+    motion = odometry_track(view)
+    found = [_against(updates, r, left_out) for r in references if not _is_fixes(r)]
+    updates = updates if left_out is None else updates.take(~left_out)
+    found += [*_if_any(satellites(updates, view, motion)), *sighted(updates, view, motion)]
+    found = [e for e in found if e.kind not in used]
+    found += [*_if_any(charging(updates, view, motion)), *second_odometry(updates, view, motion)]
+    return tuple(sorted(found, key=lambda e: (e.shared, bool(e.at_most))))
+
+
+def _if_any(evidence: Evidence | None) -> tuple[Evidence, ...]:
+    return () if evidence is None else (evidence,)
+
+
+def _is_fixes(reference: Reference) -> bool:
+    """Positions of one receiver err together, which `satellites` counts."""
+    return reference.kind == "gnss" and not np.isfinite(reference.track.xyyaw[:, 2]).any()
 
 
 def _against(
     updates: PoseTrack, reference: Reference, left_out: NDArray[np.bool_] | None
 ) -> Evidence:
-    result = nees(updates, reference.track, left_out=left_out)
     words = reference.kind.replace("_", " ")
     source = words if reference.source == reference.kind else f"{words} {reference.source}"
-    axes = ("x m", "y m", "yaw rad")
-    return Evidence(source, reference.kind, result.t_ns, result.error, result.cov, axes)
+    track, at_most, notes = reference.track, "", []
+    if reference.kind == "hindsight":
+        size = measured_hindsight_size()
+        track, at_most, notes = inflated(track, size), "it shares the robot's scans", [size.words]
+    result = nees(updates, track, left_out=left_out)
+    if result.invalid:
+        skipped = ", ".join(f"{count} {reason}" for reason, count in result.invalid.items())
+        notes.append(f"left out: {skipped}")
+    dof = 3 if np.isfinite(track.xyyaw[:, 2]).any() else 2
+    return Evidence(
+        source,
+        reference.kind,
+        result.t_ns,
+        result.error[:, :dof],
+        result.cov[:, :dof, :dof],
+        MAP_AXES[:dof],
+        at_most,
+        "; ".join(notes),
+        result.refusal or "",
+    )

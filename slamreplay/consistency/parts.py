@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from slamreplay.bundle.track import PoseTrack
-from slamreplay.consistency.evidence import Evidence
+from slamreplay.consistency.evidence import MAP_AXES, Evidence
 from slamreplay.consistency.whitening import whitened
 from slamreplay.geometry.se2 import Array
 
@@ -33,7 +33,9 @@ def judged_parts(evidence: Evidence, updates: PoseTrack) -> tuple[Part, ...]:
 
     AMCL publishes no coupling, so that a joint value would only be an approximation.
     """
-    if evidence.axes != ("x m", "y m", "yaw rad"):
+    if evidence.axes == MAP_AXES[:2]:
+        return (POSITION,)
+    if evidence.axes[2:] != MAP_AXES[2:]:
         return (Part("error", tuple(range(len(evidence.axes)))),)
     cross = updates.cov[:, :2, 2]
     coupled = bool((np.isfinite(cross) & (cross != 0.0)).any())

@@ -9,12 +9,15 @@ import numpy as np
 from slamreplay.bundle.findings import Finding
 from slamreplay.bundle.products import Hindsight
 from slamreplay.bundle.schema import SENSED_KINDS
+from slamreplay.bundle.sightings import KINDS
 from slamreplay.bundle.tables import Table
 from slamreplay.bundle.track import PoseTrack
 from slamreplay.bundle.view import Bundle
+from slamreplay.consistency.credibility import summaries_of
 from slamreplay.consistency.evidence import Reference
+from slamreplay.consistency.laid_onto import laid_onto
 from slamreplay.geometry import se2, se3
-from slamreplay.geometry.covariance import planar_from_ros, turned
+from slamreplay.geometry.covariance import planar_from_ros, ros_turned
 from slamreplay.geometry.transforms import TransformBuffer, clean_frame
 
 #: Best first. Hindsight comes after all of them: it is made of the robot's own scans, so it can
@@ -24,12 +27,21 @@ ORDER = ("simulation", "motion_capture", "survey", "gnss", "fiducial", "dock")
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """A reference topic: its poses of the base, or why they cannot be held against the belief."""
+    """A reference topic: its poses of the base, or why they cannot be held against the belief.
+
+    Attributes:
+        kind: simulation, motion_capture, ...
+        topic: it came from.
+        track: of the base in `frames.map`, or in the reference's own frame.
+        refusal: None where the track may be used.
+        only_frame: whether the frame is all that is wrong with it.
+    """
 
     kind: str
     topic: str
     track: PoseTrack
     refusal: str | None
+    only_frame: bool = False
 
 
 def references_of(bundle: Bundle, hindsight: Hindsight | None) -> tuple[Reference, ...]:
@@ -43,19 +55,44 @@ def references_of(bundle: Bundle, hindsight: Hindsight | None) -> tuple[Referenc
     return tuple(usable)
 
 
-def unused_references(bundle: Bundle) -> tuple[Finding, ...]:
-    """One finding for each judging reference in the log that cannot be held against the belief."""
-    return tuple(
-        Finding(
+def unused_references(bundle: Bundle, updates: PoseTrack | None = None) -> tuple[Finding, ...]:
+    """One finding for each reference in the log that cannot be held against the belief.
+
+    Not of tags and docks, which are no poses of the robot, and of satellite fixes only where their
+    frame is not tied to the map. Of a reference that only its frame keeps away the finding says
+    what the updates (N rows) of a belief would show, were it laid onto them.
+    """
+    target = bundle.manifest.frames.map or "map"
+    told = []
+    for c in candidates(bundle):
+        if c.refusal is None or c.kind in KINDS:
+            continue
+        if c.kind == "gnss" and c.track.frame_id == target:
+            continue
+        what, used = c.kind.replace("_", " "), "was not used"
+        if c.kind in SENSED_KINDS:  # it may well have joined hindsight
+            used = "was not held against the belief"
+        told.append(Finding(
             "SR-CON-003",
             "info",
-            f"the {c.kind.replace('_', ' ')} reference {c.topic} was not used: {c.refusal}",
+            f"the {what} reference {c.topic} {used}: {c.refusal}{_laid(c, updates)}",
             start_ns=int(c.track.t_ns[0]),
             end_ns=int(c.track.t_ns[-1]),
             n=len(c.track),
-        )
-        for c in candidates(bundle)
-        if c.refusal is not None and c.kind not in SENSED_KINDS
+        ))  # fmt: skip
+    return tuple(told)
+
+
+def _laid(candidate: Candidate, updates: PoseTrack | None) -> str:
+    if updates is None or not candidate.only_frame:
+        return ""
+    evidence = laid_onto(updates, candidate.track, candidate.topic, candidate.kind)
+    if evidence is None:
+        return ""
+    sentences = "; ".join(s.sentence for _, s in summaries_of(evidence, updates))
+    return (
+        ". Aligned to the belief, which takes out whatever is always wrong in it (how much that "
+        f"matters, no judgement), {sentences}"
     )
 
 
@@ -80,27 +117,27 @@ def _candidate(
     frame, child = (clean_frame(str(rows[name][0])) for name in ("frame_id", "child_frame_id"))
     base = frames.base or child or "base_link"
     target = frames.map or "map"
-    yaw = se3.yaw_from_quaternion(rows["orientation_xyzw"])
-    xyyaw = np.column_stack([rows["position_xyz"][:, :2], yaw])
-    cov = planar_from_ros(rows["covariance"])
+    position, R = rows["position_xyz"], se3.rotation_matrix(rows["orientation_xyzw"])
+    cov = rows["covariance"]
+    # Only static transforms may tie them: a way through the odometry frame runs through the
+    # localizer's own correction, and would hold the belief against itself.
+    T = buffer.fixed(target, frame)
+    if T is not None:
+        position, R = position @ T[:3, :3].T + T[:3, 3], T[:3, :3] @ R
+        cov, frame = ros_turned(cov, T[:3, :3]), target
+    xyyaw = np.column_stack([position[:, :2], np.arctan2(R[:, 1, 0], R[:, 0, 0])])
     refusal = None
-    if child and child != base:
-        if buffer.has_path(child, base):
-            T, known = buffer.lookup(child, base, rows.t_ns)
-            xyyaw = np.where(known[:, None], se2.compose(xyyaw, se3.planar(T)), np.nan)
-        else:
-            refusal = f"it poses '{child}', whose place on the robot is not in tf"
-    if frame != target:
-        # Only static transforms may tie them: a way through the odometry frame runs through the
-        # localizer's own correction, and would hold the belief against itself.
-        if buffer.has_path(target, frame) and all(
-            edge.is_static for edge in buffer.path(target, frame)
-        ):
-            T, _ = buffer.lookup(target, frame, rows.t_ns[:1])
-            offset = se3.planar(T)[0]
-            xyyaw = se2.compose(offset, xyyaw)
-            cov = turned(cov, np.broadcast_to(offset[2], len(cov)))
-            frame = target
-        else:
-            refusal = f"its frame is '{frame}', and no static transform ties that to '{target}'"
-    return Candidate(kind, topic, PoseTrack(frame, base, rows.t_ns, xyyaw, cov), refusal)
+    if kind in KINDS and child and child != base:
+        refusal = "it says where the robot saw a thing"
+    elif child and child != base and buffer.has_path(child, base):
+        step, known = buffer.lookup(child, base, rows.t_ns)
+        xyyaw = np.where(known[:, None], se2.compose(xyyaw, se3.planar(step)), np.nan)
+        if not np.isfinite(xyyaw[:, :2]).any():
+            refusal = f"where '{child}' is does not say where the robot is without a heading"
+    elif child and child != base:
+        refusal = f"it poses '{child}', whose place on the robot is not in tf"
+    track = PoseTrack(frame, base, rows.t_ns, xyyaw, planar_from_ros(cov))
+    only_frame = T is None and refusal is None and bool(track.has_pose.any())
+    if T is None:
+        refusal = f"its frame is '{frame}', and no static transform ties that to '{target}'"
+    return Candidate(kind, topic, track, refusal, only_frame)

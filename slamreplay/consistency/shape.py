@@ -16,11 +16,12 @@ SHAPE_OFF = 0.1
 def check(context: CheckContext) -> tuple[Suspicion, ...]:
     """SR-CON-004 from the best source; that there are too few samples is said by SR-CON-003.
 
-    What shares evidence with the belief is not asked: its errors are not the belief's own.
+    What shares evidence with the belief, or has only a bound of a
+    covariance, is not asked: its errors are not distributed as it claims.
     """
-    if context.updates is None or not context.evidence or context.evidence[0].shared:
+    evidence = next((e for e in context.evidence if e.is_exact), None)
+    if context.updates is None or evidence is None:
         return ()
-    evidence = context.evidence[0]
     answers = []
     for part in judged_parts(evidence, context.updates):
         found = distribution(part.white(evidence))

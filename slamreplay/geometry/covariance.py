@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from slamreplay.geometry.se2 import Array
+from slamreplay.geometry.se2 import Array, compose
 
 _PLANAR = np.array([0, 1, 5])
 _ROTATION_FIRST = np.array([3, 4, 5, 0, 1, 2])
@@ -29,6 +29,27 @@ def ros_from_planar(covariance: ArrayLike) -> Array:
     full = np.zeros((*block.shape[:-2], 6, 6))
     full[..., _PLANAR[:, None], _PLANAR] = block
     return full.reshape((*block.shape[:-2], 36))
+
+
+def ros_turned(covariance: ArrayLike, R_to_from: ArrayLike) -> Array:
+    """ROS covariances (..., 6, 6) seen from axes that R_to_from (3, 3) leads to.
+
+    Both parts are turned; the frame's origin does not matter, for errors are differences. An entry
+    is NaN only where one that is NaN takes part in it: who turns about z keeps x and y of a pose
+    whose height was never told.
+
+    Args:
+        covariance: (..., 36) or (..., 6, 6) about the old axes.
+        R_to_from: (3, 3).
+    """
+    full = np.asarray(covariance, dtype=np.float64)
+    full = full.reshape((*full.shape[:-1], 6, 6)) if full.shape[-1] == 36 else full
+    turn = _block_diagonal(np.asarray(R_to_from, dtype=np.float64))
+    part = (np.abs(turn) > 1e-9).astype(np.float64)
+    missing = np.isnan(full)
+    out = turn @ np.where(missing, 0.0, full) @ turn.T
+    out[part @ missing @ part.T > 0.0] = np.nan
+    return out
 
 
 def gtsam_from_ros(covariance: ArrayLike, R_parent_body: ArrayLike) -> Array:
@@ -95,6 +116,49 @@ def is_symmetric(covariance: ArrayLike) -> NDArray[np.bool_]:
     scale = np.abs(inside).max(axis=(-2, -1), initial=0.0)
     skew = np.abs(inside - np.swapaxes(inside, -2, -1)).max(axis=(-2, -1), initial=0.0)
     return np.asarray(finite & (skew <= 1e-9 * scale))
+
+
+def composed(
+    xyyaw_a_b: ArrayLike, cov_a_b: ArrayLike, xyyaw_b_c: ArrayLike, cov_b_c: ArrayLike
+) -> Array:
+    """Covariances (..., 3, 3) of T_a_c = T_a_b @ T_b_c, about axes of a, of independent poses.
+
+    To first order: the heading error of b swings c about b's origin (the compounding of Smith, Self
+    and Cheeseman, Estimating uncertain spatial relationships in robotics, 1990).
+
+    Args:
+        xyyaw_a_b: (..., 3).
+        cov_a_b: (..., 3, 3) about axes of a.
+        xyyaw_b_c: (..., 3).
+        cov_b_c: (..., 3, 3) about axes of b.
+    """
+    yaw = np.asarray(xyyaw_a_b, dtype=np.float64)[..., 2]
+    by = swing(compose(xyyaw_a_b, xyyaw_b_c), xyyaw_a_b)
+    cov = np.asarray(cov_a_b, dtype=np.float64)
+    return by @ cov @ np.swapaxes(by, -1, -2) + turned(cov_b_c, yaw)
+
+
+def between(
+    xyyaw_a_b: ArrayLike, cov_a_b: ArrayLike, xyyaw_a_c: ArrayLike, cov_a_c: ArrayLike
+) -> Array:
+    """Covariances (..., 3, 3) of T_b_c = inverse(T_a_b) @ T_a_c about axes of b, to first order.
+
+    Both poses (..., 3) with their covariances (..., 3, 3) about axes of a. They are taken to be
+    independent; of poses whose errors are alike it is more than there is.
+    """
+    yaw = np.asarray(xyyaw_a_b, dtype=np.float64)[..., 2]
+    by = swing(xyyaw_a_c, xyyaw_a_b)
+    start = by @ np.asarray(cov_a_b, dtype=np.float64) @ np.swapaxes(by, -1, -2)
+    return turned(start + np.asarray(cov_a_c, dtype=np.float64), -yaw)
+
+
+def swing(xyyaw_a_c: ArrayLike, xyyaw_a_b: ArrayLike) -> Array:
+    """Derivatives (..., 3, 3) of T_a_c by T_a_b, which carries c, both (..., 3) in axes of a."""
+    step = np.asarray(xyyaw_a_c, dtype=np.float64) - np.asarray(xyyaw_a_b, dtype=np.float64)
+    out = np.zeros((*step.shape[:-1], 3, 3))
+    out[..., 0, 0] = out[..., 1, 1] = out[..., 2, 2] = 1.0
+    out[..., 0, 2], out[..., 1, 2] = -step[..., 1], step[..., 0]
+    return out
 
 
 def is_positive_definite(covariance: ArrayLike) -> NDArray[np.bool_]:

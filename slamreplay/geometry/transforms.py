@@ -115,6 +115,16 @@ class TransformBuffer:
         T_common_target, valid_target = self._chain(up_target, common, t_ns)
         return se3.inverse(T_common_target) @ T_common_source, valid_source & valid_target
 
+    def fixed(self, target: str, source: str) -> Array | None:
+        """T_target_source (4, 4) where only static edges lie between them; None where not."""
+        if target == source:
+            return np.eye(4)
+        if not self.has_path(target, source):
+            return None
+        if not all(edge.is_static for edge in self.path(target, source)):
+            return None
+        return self.lookup(target, source, np.zeros(1, dtype=np.int64))[0][0]
+
     def path(self, target: str, source: str) -> list[Edge]:
         """The edges between two connected frames, in no particular direction."""
         up_target, up_source = self._ancestry(target), self._ancestry(source)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from slamreplay.bundle.findings import FINDINGS
+from slamreplay.consistency.evidence import SHARED_KINDS
+from slamreplay.consistency.nees import PARTS
 from slamreplay.report.evidence import Postmortem
 
 _NEEDS_BELIEF = ("SR-LOC-001", "SR-MAP-FRAME", "SR-CON-001", "SR-CON-002")
@@ -25,13 +27,20 @@ def not_assessable(post: Postmortem) -> dict[str, str]:
     undecided = [
         f for f in post.findings if f.id == "SR-CON-003" and not f.message.startswith(runs)
     ]
-    if undecided:
+    if undecided and not _decided(post):
         reasons.setdefault("SR-CON-001", undecided[0].message)
     if post.judgement.state in ("unobservable", "insufficient_data"):
         for id_ in ("SR-LOC-001", "SR-MAP-001", "SR-MAP-FRAME"):
             reasons.setdefault(id_, post.judgement.summary.rstrip("."))
     answered = {finding.id for finding in post.findings}
     return {id_: why for id_, why in reasons.items() if id_ not in answered}
+
+
+def _decided(post: Postmortem) -> bool:
+    """Whether a reference of its own told of the covariance, whatever another one could not."""
+    if post.nees is None or post.reference_kind in SHARED_KINDS:
+        return False
+    return any(post.nees.summary(part).credibility != "insufficient" for part in PARTS)
 
 
 def title_of(id_: str) -> str:

@@ -53,8 +53,9 @@ def outgrown(
 ) -> tuple[list[Stretch], float | None]:
     """Stretches in which the error left what its covariance allows, and the p-value of the rest.
 
-    Sources that share no evidence with the belief are asked; only where there is none, another,
-    against which only a sigma too small by `GROSS` counts.
+    Sources that share no evidence with the belief are asked; where none of them has the covariance
+    that it claims, but only a bound of it, another as well, against which only a sigma too small by
+    `GROSS` counts.
     Position and heading are looked at apart: of a consistent belief either is consistent, whether
     they are coupled or not. P-values are multiplied by the number of series that were looked at.
 
@@ -67,8 +68,9 @@ def outgrown(
         where it is one that is not told), None where there was nothing to look at.
     """
     independent = [s for e in evidence if not e.shared for s in _series(e)]
-    shared = next((told for e in evidence if e.shared and (told := list(_series(e)))), [])
-    asked = independent or shared
+    shared = next((rows for e in evidence if e.shared and (rows := list(_series(e)))), [])
+    told = any(series.evidence.is_exact for series in independent)
+    asked = independent if told else [*independent, *shared]
     found, least = [], 1.0
     for series in asked:
         looked = _look(series.white)

@@ -8,11 +8,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from slamreplay.bundle.batteries import STATES
 from slamreplay.ingest.decoders.decoder import Decoded, Decoder, Messages
 from slamreplay.ingest.decoders.health import INFO
 
-#: BatteryState.power_supply_status; anything else is unknown too.
-_STATES = np.array(["unknown", "charging", "discharging", "not charging", "full"], dtype=object)
+#: Anything else is unknown too.
+_STATES = np.array(STATES, dtype=object)
 #: Many drivers leave the status unknown; Nav2 takes more than this many ampere for charging
 #: (opennav_docking, simple_charging_dock.cpp).
 _CHARGING_A = 0.5
