@@ -237,10 +237,10 @@ FINDINGS: dict[str, Explanation] = {
         "2007, On achievable accuracy for range-finder localization), less what sightings and "
         "fixes add. One finding for all that overlap; its value is the factor by which sigma was "
         "too small, or shrank.",
-        "A reference that jumps makes any belief look too sure of itself. What shares evidence "
-        "with the belief proves nothing where it is silent. A localizer may have used sensors "
-        "that are not in the log, and a smoother what came later. The floor takes the map's cells "
-        "as all that is known of walls.",
+        "A reference that jumps, or whose clock is off, makes any belief look too sure. What "
+        "shares evidence with the belief proves nothing where it is silent. A localizer may have "
+        "used sensors that are not in the log, and a smoother what came later. The floor takes the "
+        "map's cells as all that is known of walls.",
     ),
     "SR-CON-011": Explanation(
         "Mean and covariance do not belong together",

@@ -57,6 +57,11 @@ class Belonging:
         return f"in {parted} of {seen} updates mean and covariance are of different particles"
 
 
+def several(clusters: se2.Array) -> NDArray[np.bool_]:
+    """(N,) whether a mean of one of so many clusters (N,) is another thing than that of all."""
+    return np.asarray(np.isfinite(clusters) & (clusters != 1.0))
+
+
 def belonging_of_run(
     updates: PoseTrack, belief: PoseTrack, diagnostics: Mapping[str, se2.Array]
 ) -> Belonging | None:
@@ -66,8 +71,7 @@ def belonging_of_run(
     order = np.argsort(belief.t_ns, kind="stable")
     row = np.searchsorted(belief.t_ns[order], updates.t_ns, side="right") - 1
     count = diagnostics["clusters"][order][np.maximum(row, 0)]
-    seen = np.isfinite(count)
-    parted = seen & (count != 1.0)
+    seen, parted = np.isfinite(count), several(count)
     if not parted.any():
         return Belonging(updates.t_ns, seen, parted)
     worst = int(np.argmax(np.where(parted, count, -1.0)))

@@ -41,7 +41,8 @@ class Evidence:
         kind: of the reference; those of `SHARED_KINDS` never prove consistency.
         t_ns: (N,) times, sorted.
         error: (N, m) belief minus source in `axes`; NaN rows where either is missing.
-        cov: (N, m, m) claimed for it: the belief's, projected, plus the source's own.
+        cov: (N, m, m) claimed for it: the belief's, projected, plus the source's own; NaN where the
+            error is not to be held against it.
         axes: names and units of the m components.
         at_most: why `cov` is more than the errors can have: a sensor's noise was taken at its usual
             most, or errors that share a cause were added up. Such evidence may show that a belief

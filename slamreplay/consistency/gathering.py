@@ -60,7 +60,7 @@ def evidence_of(
         view: the log; what was held out of hindsight judges the belief all the same.
         used: kinds of references that the belief is known to be made of: they say nothing of it.
         left_out: (N,) updates whose mean and covariance part: no error is held against them, and
-            those against a reference are NaN.
+            the covariances of those against a reference are NaN.
     """
     view = replace(view, held_out=frozenset())
     motion = odometry_track(view)

@@ -39,7 +39,8 @@ class Nees:
     Attributes:
         t_ns: (N,) times.
         error: (N, 3) belief minus reference, m, m, rad; NaN where either is missing.
-        cov: (N, 3, 3) the belief's plus the reference's own, in the same axes.
+        cov: (N, 3, 3) the belief's plus the reference's own, in the same axes; NaN where the error
+            is not to be held against it.
         joint: (N,) of x y yaw, NaN where invalid.
         xy: (N,) of the position alone.
         yaw: (N,) of the heading alone.
@@ -101,12 +102,12 @@ def nees(
             f"'{reference.frame_id}', and nothing independent of the belief ties them"
         )
         error = np.full_like(error, np.nan)
+    cov = estimate.cov + np.where(np.isfinite(truth.cov), truth.cov, 0.0)
     left_out = np.zeros(len(order), dtype=bool) if left_out is None else left_out[order]
-    error[left_out] = np.nan
+    cov[left_out] = np.nan
     with np.errstate(invalid="ignore"):
         headless = estimate.cov[:, 2, 2] > ANY_HEADING
-    error[headless, 2] = np.nan
-    cov = estimate.cov + np.where(np.isfinite(truth.cov), truth.cov, 0.0)
+    cov[headless, 2, :] = cov[headless, :, 2] = np.nan
     parts = {part: _squared(error, cov, list(index)) for part, index in PARTS.items()}
     reasons = {
         "frames differ": np.full(len(estimate), refusal is not None),

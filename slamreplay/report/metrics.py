@@ -6,6 +6,7 @@ import numpy as np
 
 from slamreplay.bundle.run import Run
 from slamreplay.bundle.track import PoseTrack
+from slamreplay.consistency.belonging import several
 from slamreplay.consistency.nees import nees
 from slamreplay.verdict.limits import Limits
 
@@ -26,7 +27,7 @@ def run_metrics(
 
     `hindsight_rmse_m`, `hindsight_max_m`, `hindsight_max_rad`: distance to where the robot really
     was; `lost_share`: of the rows beyond the limits of lost; `nees_mean` (x y yaw, 3 is expected)
-    and `nees_n_eff`: against the best reference of the log.
+    and `nees_n_eff`: against the best reference of the log, rows of several clusters left out.
     """
     metrics: dict[str, float | None] = dict.fromkeys(_NAMES)
     if run.estimate is None:
@@ -43,7 +44,9 @@ def run_metrics(
             metrics["hindsight_max_rad"] = float(turn.max())
             metrics["lost_share"] = float(off.mean())
     if reference is not None:
-        summary = nees(track, reference).summary("joint").test
+        clusters = run.estimate.diagnostics.get("clusters")
+        left_out = None if clusters is None else several(clusters)
+        summary = nees(track, reference, left_out=left_out).summary("joint").test
         if summary.n:
             metrics["nees_mean"], metrics["nees_n_eff"] = summary.mean, summary.n_eff
     return metrics

@@ -79,6 +79,6 @@ def _shrinking(track: PoseTrack, rows: NDArray[np.int64], text: str) -> list[Str
     first = int(np.flatnonzero(size[: last + 1] == before[last])[-1])
     start, end = int(track.t_ns[rows[first]]), int(track.t_ns[rows[last]])
     was, became = position_sigma(track.cov[rows[[first, last]]])
-    words = f"sigma shrank by a factor of {shrunk[last]:.2g} (the position's from {was:.2g} to "
-    words += f"{became:.2g} m) {text}"
+    factor = f"by a factor of {shrunk[last]:.2g}" if size[last] > 0.0 else "to nothing"
+    words = f"sigma shrank {factor} (the position's from {was:.2g} to {became:.2g} m) {text}"
     return [Stretch(start, end, {"uninformed": words}, last - first + 1, float(shrunk[last]))]
