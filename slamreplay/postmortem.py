@@ -12,11 +12,13 @@ from slamreplay.bundle.findings import SEVERITIES, Finding
 from slamreplay.bundle.odometry import odometry_track
 from slamreplay.bundle.run import Run
 from slamreplay.bundle.view import Bundle, BundleView
-from slamreplay.consistency.asking import ask
+from slamreplay.consistency.answers import raised
+from slamreplay.consistency.asking import answered
 from slamreplay.consistency.context import CheckContext
 from slamreplay.consistency.credibility import nees_of_belief
 from slamreplay.consistency.references import references_of, unused_references
 from slamreplay.consistency.sensed import sensed_references
+from slamreplay.consistency.summary import consistency_summaries
 from slamreplay.hindsight.pipeline import hindsight
 from slamreplay.replay.metrics import trial_metrics
 from slamreplay.report.evidence import Postmortem, TrialResult
@@ -72,7 +74,9 @@ def postmortem(
     findings = [*judgement.findings, *unused_references(bundle, context.updates)]
     findings += sensed_references(bundle, found, hold_out)
     undisturbed = (run for run in runs if run.trial.perturbation is None)
-    findings += ask([context, *(CheckContext.of_run(run, references, view) for run in undisturbed)])
+    asked = [context, *(CheckContext.of_run(run, references, view) for run in undisturbed)]
+    answers = answered(asked)
+    findings += raised(answers)
     track = None if found is None else found.track
     trials = tuple(
         TrialResult(
@@ -98,6 +102,7 @@ def postmortem(
         odometry=odometry_track(view),
         frame_offset=judgement.frame_offset,
         nees=nees_of_belief(context),
+        consistency=consistency_summaries(context, answers),
         trials=trials,
     )
 

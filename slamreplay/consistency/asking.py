@@ -12,7 +12,14 @@ from slamreplay.consistency.context import CheckContext
 
 
 def ask(contexts: Sequence[CheckContext], names: Iterable[str] | None = None) -> list[Finding]:
-    """What the checks find, with p-values corrected over all of it after Holm.
+    """What the checks find, with p-values corrected over all of it after Holm; see `answered`."""
+    return list(raised(answered(contexts, names)))
+
+
+def answered(
+    contexts: Sequence[CheckContext], names: Iterable[str] | None = None
+) -> tuple[Answer, ...]:
+    """All that the checks answer, facts and suspicions, before any correction.
 
     Args:
         contexts: the log with the robot's own belief, and runs of estimators on it; runs are only
@@ -28,7 +35,7 @@ def ask(contexts: Sequence[CheckContext], names: Iterable[str] | None = None) ->
         for name in chosen:
             if not context.subject or name in ABOUT_BELIEF:
                 answers += (_told(answer, context.subject) for answer in CHECKS.load(name)(context))
-    return list(raised(answers))
+    return tuple(answers)
 
 
 def _told(answer: Answer, subject: str) -> Answer:

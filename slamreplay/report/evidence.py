@@ -15,6 +15,7 @@ from slamreplay.bundle.products import Hindsight
 from slamreplay.bundle.run import Run
 from slamreplay.bundle.track import PoseTrack
 from slamreplay.consistency.nees import Nees
+from slamreplay.consistency.summary import ConsistencySummary
 from slamreplay.geometry import se2
 from slamreplay.geometry.times import seconds_since
 from slamreplay.maps.grid import OccupancyGrid
@@ -48,6 +49,7 @@ class Postmortem:
         odometry: the path by odometry alone, drawn where nothing better is known.
         frame_offset: what the verdict took out of the belief: its map lies elsewhere than this one.
         nees: of the belief at its own updates, None without covariance or reference.
+        consistency: the belief's covariance against every source that can tell, the best first.
         trials: perturbation trials, baseline first.
         reliability: how often what was said with a confidence was right, as measured.
     """
@@ -64,6 +66,7 @@ class Postmortem:
     odometry: PoseTrack | None = None
     frame_offset: ConstantOffset | None = None
     nees: Nees | None = None
+    consistency: tuple[ConsistencySummary, ...] = ()
     trials: tuple[TrialResult, ...] = ()
     reliability: Reliability = field(default_factory=measured_reliability)
 

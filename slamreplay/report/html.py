@@ -14,6 +14,7 @@ from matplotlib.figure import Figure
 from slamreplay.report.clean import clean
 from slamreplay.report.evidence import Postmortem
 from slamreplay.report.figures import canvas
+from slamreplay.report.figures.consistency import consistency_figure
 from slamreplay.report.figures.course import course_figure
 from slamreplay.report.figures.covariance import covariance_figure
 from slamreplay.report.figures.map import map_figure
@@ -57,6 +58,7 @@ def _pictures(post: Postmortem, view: Page) -> dict[str, Picture | None]:
         "map": _picture(post, map_figure, canvas.BESIDE, view.map_alt),
         "course": _picture(post, course_figure, canvas.WIDE, view.course_alt),
         "covariance": _picture(post, covariance_figure, canvas.WIDE, view.covariance_alt),
+        "consistency": _picture(post, _consistency, canvas.WIDE, view.consistency_alt),
         "reliability": _picture(post, _reliability, canvas.BESIDE, view.reliability_alt),
     }
 
@@ -67,6 +69,10 @@ def _picture(
     with canvas.plain_style():
         wide, narrow = draw(post, width_in), draw(post, canvas.NARROW)
         return None if wide is None or narrow is None else Picture(_uri(wide), _uri(narrow), alt)
+
+
+def _consistency(post: Postmortem, width_in: float) -> Figure | None:
+    return consistency_figure(post.consistency, width_in)
 
 
 def _reliability(post: Postmortem, width_in: float) -> Figure | None:

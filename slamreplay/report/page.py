@@ -8,7 +8,7 @@ from datetime import UTC, datetime
 from slamreplay import __version__
 from slamreplay.bundle.manifest import Manifest, MapVersion
 from slamreplay.geometry.times import NS_PER_S
-from slamreplay.report import phrases, tables
+from slamreplay.report import consistency_tables, phrases, tables
 from slamreplay.report.assess import not_assessable, title_of
 from slamreplay.report.evidence import Postmortem
 from slamreplay.report.facts import Fact, deciding_facts
@@ -60,6 +60,11 @@ class Page:
     course_alt: str
     covariance_alt: str
     reference_note: str
+    means: Table
+    coverage: Table
+    consistency_note: str
+    coverage_note: str
+    consistency_alt: str
     trials_note: str
     confidence_note: str
     reliability_alt: str
@@ -121,6 +126,11 @@ def page(post: Postmortem) -> Page:
         course_alt=phrases.course_alt(post),
         covariance_alt=phrases.covariance_alt(post),
         reference_note=phrases.reference_note(post),
+        means=consistency_tables.means(post.consistency),
+        coverage=consistency_tables.coverage(post.consistency),
+        consistency_note=consistency_tables.note(post.consistency),
+        coverage_note=consistency_tables.coverage_note(post.consistency),
+        consistency_alt=consistency_tables.alt(post.consistency),
         trials_note=phrases.trials_note(post),
         confidence_note=phrases.confidence_note(judgement.confidence, post.reliability),
         reliability_alt=phrases.reliability_alt(post.reliability),

@@ -147,7 +147,7 @@ def _draw_nees(axes: Axes, post: Postmortem, size: float) -> list[object]:
     if summary.low is not None and summary.high is not None:
         low, high = max(summary.low, floor), max(summary.high, floor)
         axes.axhspan(low, high, color=SKY, alpha=0.3, linewidth=0.0, zorder=1)
-        handles.append(Patch(color=SKY, alpha=0.3, label="chance would put the mean here (99.9 %)"))
+        handles.append(Patch(color=SKY, alpha=0.3, label="chance would put the mean here (95 %)"))
     if summary.mean is not None:
         axes.axhline(max(summary.mean, floor), color=VERMILLION, linewidth=1.4, zorder=3)
         handles.append(Line2D([], [], color=VERMILLION, lw=1.4, label=f"mean: {summary.mean:.3g}"))
