@@ -9,6 +9,7 @@ from scipy.stats import chi2, t, truncnorm, ttest_1samp
 
 from slamreplay.bundle.run import Innovations
 from slamreplay.bundle.track import PoseTrack
+from slamreplay.consistency import innovation_bias
 from slamreplay.consistency.asking import ask
 from slamreplay.consistency.context import CheckContext
 from slamreplay.consistency.innovation_bias import bias_of
@@ -122,6 +123,7 @@ def test_a_slow_wave_is_no_bias():
     seen = Innovations("s", t_ns, wave, S, np.ones(300, dtype=bool))
 
     assert bias_of(wave[:, 0]).n_eff < 20.0
+    assert innovation_bias.check(CheckContext(None, (), VIEW, "kf", (seen,))) == ()
     assert [f.id for f in told((seen,), ["innovation_bias", "whiteness"])] == ["SR-CON-007"]
 
 
