@@ -9,6 +9,7 @@ from scipy.stats import chi2, t, truncnorm, ttest_1samp
 
 from slamreplay.bundle.run import Innovations
 from slamreplay.bundle.track import PoseTrack
+from slamreplay.consistency import innovation_bias
 from slamreplay.consistency.asking import ask
 from slamreplay.consistency.context import CheckContext
 from slamreplay.consistency.innovation_bias import bias_of
@@ -100,6 +101,30 @@ def test_a_sure_but_slight_bias_is_only_told():
 
     assert finding.severity == "info"
     assert finding.p_adjusted < 1e-3
+
+
+def test_asking_each_axis_alone_is_paid_for():
+    p = np.array([nis_tests(innovation_sets(one)[0]).p_value for one in filters(400)])
+
+    assert np.mean(p < 0.05) < 0.065
+
+
+def test_an_axis_that_is_wrong_alone_is_named():
+    seen = filters(1)[0][0]
+    (finding,) = told((replace(seen, residual=seen.residual * [1.5, 0.8]),), ["nis"])
+
+    assert "the x innovations of position are 1.44" in finding.message
+    assert "each axis alone: x 1.44, y 0.83" in finding.message
+
+
+def test_a_slow_wave_is_no_bias():
+    t_ns, S = np.arange(300), np.ones((300, 1, 1))
+    wave = np.sin(np.arange(300) / 40.0)[:, None] + 0.3
+    seen = Innovations("s", t_ns, wave, S, np.ones(300, dtype=bool))
+
+    assert bias_of(wave[:, 0]).n_eff < 20.0
+    assert innovation_bias.check(CheckContext(None, (), VIEW, "kf", (seen,))) == ()
+    assert [f.id for f in told((seen,), ["innovation_bias", "whiteness"])] == ["SR-CON-007"]
 
 
 # --- gates -----------------------------------------------------------------------------------
