@@ -1,5 +1,7 @@
 """What a belief is held against: consistent ones have whitened errors of variance 1."""
 
+import re
+
 import numpy as np
 import pytest
 from evidence_logs import (
@@ -436,16 +438,9 @@ def test_every_independent_source_is_asked_and_named():
     tables = [*tagged(rng, told=0.5), docks]
     answers = check(context_of(tables, [truth("motion_capture"), truth("hindsight")]))
 
-    told = [(a.finding.id, a.finding.message.split("against ")[-1]) for a in answers]
-    assert (
-        told
-        == [
-            ("SR-CON-001", "motion capture"),
-            ("SR-CON-001", "surveyed fiducials tag_1, tag_2, tag_3 and 1 more"),
-            ("SR-CON-001", "docks seen again, dock"),
-        ][: len(told)]
-    )
-    assert len(told) >= 2
+    told = [a.finding.message.split("against ")[1].split(";")[0] for a in answers]
+    assert told[:2] == ["motion capture", "surveyed fiducials tag_1, tag_2, tag_3 and 1 more"]
+    assert told[2:] in ([], ["docks seen again, dock"])
     assert all(a.p_value < 1e-3 for a in answers[:2])
     assert "by a factor of 2" in answers[0].finding.message
     assert "by a factor of at least 1." in answers[1].finding.message
@@ -456,7 +451,7 @@ def test_shared_evidence_is_asked_only_where_nothing_else_tells():
     tables = tagged(rng, told=0.2)
     answers = check(context_of(tables, [truth("hindsight")]))
 
-    by = {a.finding.message.split("against ")[1].split(" (")[0]: a for a in answers}
+    by = {re.split(r"; | \(", a.finding.message.split("against ")[1])[0]: a for a in answers}
     assert set(by) == {"surveyed fiducials tag_1, tag_2, tag_3 and 1 more", "hindsight"}
     assert all(a.p_value < 1e-3 for a in by.values())
     assert "hindsight's covariance was taken as it is" in by["hindsight"].finding.message
