@@ -139,5 +139,6 @@ def _candidate(
     track = PoseTrack(frame, base, rows.t_ns, xyyaw, planar_from_ros(cov))
     only_frame = T is None and refusal is None and bool(track.has_pose.any())
     if T is None:
-        refusal = f"its frame is '{frame}', and no static transform ties that to '{target}'"
+        refusal = f"its frame is '{frame}', and no static transform ties that to '{target}' (who "
+        refusal += "knows it gives reference_in_map: [x_m, y_m, yaw_deg] in a topics file)"
     return Candidate(kind, topic, track, refusal, only_frame)

@@ -11,13 +11,14 @@ import yaml
 from slamreplay.bundle.role_tables import ROLE_TABLES
 from slamreplay.errors import UsageError
 from slamreplay.ingest.clouds.band import BAND_KEY
+from slamreplay.ingest.placed_reference import PLACE_KEY, checked_place
 
 #: Frames may be named too, where neither tf nor REP-105's names say which is which.
 FRAME_KEYS = ("map_frame", "odom_frame", "base_frame")
 
 
 def read_overrides(path: Path | None) -> dict[str, str]:
-    """`role: topic`, `*_frame: frame` and the height band of clouds in a yaml, {} without one.
+    """`role: topic`, `*_frame: frame` and what has a key of its own in a yaml, {} without one.
 
     Raises:
         UsageError: the file cannot be read, or has a key that is no role.
@@ -33,12 +34,14 @@ def read_overrides(path: Path | None) -> dict[str, str]:
         return {}
     if not isinstance(given, dict):
         raise UsageError("a topics file holds lines of ROLE: TOPIC", where=path)
-    keys = [*ROLE_TABLES, *FRAME_KEYS, BAND_KEY]
+    keys = [*ROLE_TABLES, *FRAME_KEYS, BAND_KEY, PLACE_KEY]
     for key, value in given.items():
         if key not in keys:
             raise UsageError(f"there is no role '{key}'", where=path, hint=_nearest(str(key), keys))
         if key == BAND_KEY:
             given = {**given, key: _band(value, path)}
+        elif key == PLACE_KEY:
+            given = {**given, key: checked_place(value, path)}
         elif not isinstance(value, str) or not value:
             raise UsageError(f"the value of '{key}' is no name", where=path)
     return {str(k): str(v) for k, v in given.items()}

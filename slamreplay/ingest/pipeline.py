@@ -27,6 +27,7 @@ from slamreplay.ingest.meaning import without_meaning
 from slamreplay.ingest.options import IngestOptions
 from slamreplay.ingest.overrides import check_topics, read_overrides
 from slamreplay.ingest.parts import missing_parts
+from slamreplay.ingest.placed_reference import placed_reference
 from slamreplay.ingest.readers.open_log import open_log
 from slamreplay.ingest.reading import read_rows
 from slamreplay.ingest.reference_file import read_reference
@@ -85,16 +86,18 @@ def _ingest(
 
     clock = choose_clock(cast.topics)
     timed = []
-    for topic in layers.topics:
+    for rows in layers.topics:
+        topic, placed = placed_reference(rows, overrides, cast.frames.map or "map")
         t_ns, remarks = row_times(topic, clock)
+        losses += placed
         timed.append((topic, t_ns))
         losses += [] if is_told_in_log(topic) else remarks  # its lines are told of already
     if options.reference is not None:
-        rows, source, remarks = _survey(options.reference, cast.frames)
-        timed.append((rows, rows.t_sensor_ns))
+        survey, source, remarks = _survey(options.reference, cast.frames)
+        timed.append((survey, survey.t_sensor_ns))
         losses += remarks
         sources.append(source)
-        layers.choices["reference"] = Choice(rows, "given with --reference")
+        layers.choices["reference"] = Choice(survey, "given with --reference")
 
     tables = build(timed)
     span = evidence_span(tables, cast.frames, logs[0], losses)
