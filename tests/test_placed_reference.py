@@ -69,6 +69,6 @@ def test_a_place_that_is_none_is_refused_in_one_line(tmp_path, text):
 
 def test_a_place_is_read_to_the_last_digit(tmp_path):
     file = tmp_path / "t.yaml"
-    file.write_text("reference_in_map: [0.1, -2, 1e-3]\n", encoding="utf-8")
+    file.write_text("reference_in_map: [0.1, -2, 0.001]\n", encoding="utf-8")
 
     assert read_overrides(file) == {"reference_in_map": "0.1 -2.0 0.001"}
