@@ -132,7 +132,8 @@ FINDINGS: dict[str, Explanation] = {
         "before. Where no reference tells, hindsight and a second odometry, against which only a "
         "factor of 2 counts. Where position and heading are not coupled, as in AMCL, they are "
         "judged apart; a heading whose variance is beyond pi^2 / 3, uniform over the circle, is "
-        "not known and left out.",
+        "not known and left out. A belief whose height, roll and pitch and their variances change, "
+        "against a reference in space: position and rotation vector, six axes.",
         "Of all sources but poses of a reference the covariance is only a bound: sigma may be "
         "found too small, by at least the factor, and never right or too large. A tag that was "
         "moved, one whose heading flips, a camera whose mount is off, or charging by hand looks "

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slamreplay.bundle.track import PoseTrack
+from slamreplay.consistency.spatial_track import SpatialTrack
 from slamreplay.geometry.se2 import Array
 
 #: Kinds that are made of evidence which the belief used as well: they may show that it is too sure
@@ -16,15 +17,25 @@ SHARED_KINDS = frozenset({"hindsight", "second_odometry"})
 
 #: Axes of errors in the map's frame, position first; of a thing that has no heading the first two.
 MAP_AXES = ("x m", "y m", "yaw rad")
+#: Axes of errors in space: a rotation vector about the axes of the map's frame.
+SPATIAL_AXES = ("x m", "y m", "z m", "rx rad", "ry rad", "rz rad")
 
 
 @dataclass(frozen=True, eq=False)
 class Reference:
-    """Base in map from one source, and what kind of source that is."""
+    """Base in map from one source, and what kind of source that is.
+
+    Attributes:
+        kind: simulation, motion_capture, ...
+        source: its topic, or its kind again.
+        track: of the base, in the plane.
+        spatial: of the base in space; None of a source that never leaves the plane.
+    """
 
     kind: str
     source: str
     track: PoseTrack
+    spatial: SpatialTrack | None = None
 
     @property
     def shared(self) -> bool:

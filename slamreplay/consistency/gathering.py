@@ -12,13 +12,15 @@ from slamreplay.bundle.odometry import odometry_track
 from slamreplay.bundle.track import PoseTrack
 from slamreplay.bundle.view import BundleView
 from slamreplay.consistency.charging import charging
-from slamreplay.consistency.evidence import MAP_AXES, Evidence, Reference
+from slamreplay.consistency.evidence import MAP_AXES, SPATIAL_AXES, Evidence, Reference
 from slamreplay.consistency.hindsight_size import inflated, measured_hindsight_size
-from slamreplay.consistency.nees import nees
+from slamreplay.consistency.nees import MAX_GAP_NS, nees
+from slamreplay.consistency.nees_spatial import spatial_belief, spatial_errors
 from slamreplay.consistency.published import fresh_rows, published_belief
 from slamreplay.consistency.satellites import satellites
 from slamreplay.consistency.second_odometry import second_odometry
 from slamreplay.consistency.sighted import sighted
+from slamreplay.consistency.spatial_track import SpatialTrack
 from slamreplay.geometry.se2 import Array
 
 
@@ -64,7 +66,8 @@ def evidence_of(
     """
     view = replace(view, held_out=frozenset())
     motion = odometry_track(view)
-    found = [_against(updates, r, left_out) for r in references if not _is_fixes(r)]
+    spatial = spatial_belief(view, updates)
+    found = [_against(updates, spatial, r, left_out) for r in references if not _is_fixes(r)]
     updates = updates if left_out is None else updates.take(~left_out)
     found += [*_if_any(satellites(updates, view, motion)), *sighted(updates, view, motion)]
     found = [e for e in found if e.kind not in used]
@@ -82,7 +85,10 @@ def _is_fixes(reference: Reference) -> bool:
 
 
 def _against(
-    updates: PoseTrack, reference: Reference, left_out: NDArray[np.bool_] | None
+    updates: PoseTrack,
+    spatial: SpatialTrack | None,
+    reference: Reference,
+    left_out: NDArray[np.bool_] | None,
 ) -> Evidence:
     words = reference.kind.replace("_", " ")
     source = words if reference.source == reference.kind else f"{words} {reference.source}"
@@ -95,13 +101,18 @@ def _against(
         skipped = ", ".join(f"{count} {reason}" for reason, count in result.invalid.items())
         notes.append(f"left out: {skipped}")
     dof = 3 if np.isfinite(track.xyyaw[:, 2]).any() else 2
+    error, cov, axes = result.error[:, :dof], result.cov[:, :dof, :dof], MAP_AXES[:dof]
+    if spatial is not None and reference.spatial is not None and result.refusal is None:
+        error, cov = spatial_errors(spatial, reference.spatial, MAX_GAP_NS)
+        error[np.isnan(result.error[:, :2]).any(axis=1)] = np.nan  # as those that were left out
+        axes = SPATIAL_AXES
     return Evidence(
         source,
         reference.kind,
         result.t_ns,
-        result.error[:, :dof],
-        result.cov[:, :dof, :dof],
-        MAP_AXES[:dof],
+        error,
+        cov,
+        axes,
         at_most,
         "; ".join(notes),
         result.refusal or "",

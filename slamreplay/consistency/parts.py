@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from slamreplay.bundle.track import PoseTrack
-from slamreplay.consistency.evidence import MAP_AXES, Evidence
+from slamreplay.consistency.evidence import MAP_AXES, SPATIAL_AXES, Evidence
 from slamreplay.consistency.whitening import whitened
 from slamreplay.geometry.se2 import Array
 
@@ -26,6 +26,9 @@ class Part:
 
 
 POSE, POSITION, HEADING = Part("pose", (0, 1, 2)), Part("position", (0, 1)), Part("heading", (2,))
+#: In space position and rotation are judged apart, so that it is told which of them is off.
+SPATIAL = (Part("position", (0, 1, 2)), Part("rotation", (3, 4, 5)))
+SPATIAL_POSE = Part("pose", (0, 1, 2, 3, 4, 5))
 
 
 def judged_parts(evidence: Evidence, updates: PoseTrack) -> tuple[Part, ...]:
@@ -33,6 +36,8 @@ def judged_parts(evidence: Evidence, updates: PoseTrack) -> tuple[Part, ...]:
 
     AMCL publishes no coupling, so that a joint value would only be an approximation.
     """
+    if evidence.axes == SPATIAL_AXES:
+        return SPATIAL
     if evidence.axes == MAP_AXES[:2]:
         return (POSITION,)
     if evidence.axes[2:] != MAP_AXES[2:]:

@@ -18,12 +18,8 @@ def published_belief(view: BundleView) -> PoseTrack | None:
     AMCL publishes on updates only, stamped with the scan it used, so these rows are the updates.
     None where no pose topic plays the role or no row has a covariance.
     """
-    table = view.role("covariance") or view.role("pose")
+    table = update_rows(view)
     if table is None or not len(table):
-        return None
-    cov = planar_from_ros(table["covariance"])
-    table, cov = _given(table, cov)
-    if not len(table):
         return None
     yaw = se3.yaw_from_quaternion(table["orientation_xyzw"])
     xyyaw = np.column_stack([table["position_xyz"][:, :2], yaw])
@@ -34,7 +30,22 @@ def published_belief(view: BundleView) -> PoseTrack | None:
         T, known = view.transforms.lookup(child, base, table.t_ns)
         xyyaw = np.where(known[:, None], se2.compose(xyyaw, se3.planar(T)), np.nan)
     frame = clean_frame(str(table["frame_id"][0])) or frames.map or "map"
-    return PoseTrack(frame, base, table.t_ns, xyyaw, cov)
+    return PoseTrack(frame, base, table.t_ns, xyyaw, planar_from_ros(table["covariance"]))
+
+
+def update_rows(view: BundleView) -> Table | None:
+    """The rows of the belief's topic with a covariance, in time order; None without such a topic.
+
+    Of equal stamps the last message holds.
+    """
+    table = view.role("covariance") or view.role("pose")
+    if table is None:
+        return None
+    order = np.argsort(table.t_ns, kind="stable")
+    cov = planar_from_ros(table["covariance"])
+    order = order[~np.isnan(cov[order]).all(axis=(1, 2))]
+    t = table.t_ns[order]
+    return table.take(order[np.append(t[1:] != t[:-1], True)] if len(order) else order)
 
 
 def fresh_rows(track: PoseTrack) -> PoseTrack:
@@ -44,12 +55,3 @@ def fresh_rows(track: PoseTrack) -> PoseTrack:
     given = np.isfinite(track.cov).all(axis=(1, 2))
     same = (track.cov[1:] == track.cov[:-1]).all(axis=(1, 2))
     return track.take(given & np.append(True, ~same))
-
-
-def _given(table: Table, cov: se2.Array) -> tuple[Table, se2.Array]:
-    """Rows with a covariance, in time order; of equal stamps the last message holds."""
-    order = np.argsort(table.t_ns, kind="stable")
-    order = order[~np.isnan(cov[order]).all(axis=(1, 2))]
-    t = table.t_ns[order]
-    order = order[np.append(t[1:] != t[:-1], True)] if len(order) else order
-    return table.take(order), cov[order]

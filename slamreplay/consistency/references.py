@@ -16,6 +16,7 @@ from slamreplay.bundle.view import Bundle
 from slamreplay.consistency.credibility import summaries_of
 from slamreplay.consistency.evidence import Reference
 from slamreplay.consistency.laid_onto import laid_onto
+from slamreplay.consistency.spatial_track import SpatialTrack
 from slamreplay.geometry import se2, se3
 from slamreplay.geometry.covariance import planar_from_ros, ros_turned
 from slamreplay.geometry.transforms import TransformBuffer, clean_frame
@@ -35,6 +36,7 @@ class Candidate:
         track: of the base in `frames.map`, or in the reference's own frame.
         refusal: None where the track may be used.
         only_frame: whether the frame is all that is wrong with it.
+        spatial: the track in space; None where it never leaves the plane.
     """
 
     kind: str
@@ -42,6 +44,7 @@ class Candidate:
     track: PoseTrack
     refusal: str | None
     only_frame: bool = False
+    spatial: SpatialTrack | None = None
 
 
 def references_of(bundle: Bundle, hindsight: Hindsight | None) -> tuple[Reference, ...]:
@@ -49,7 +52,11 @@ def references_of(bundle: Bundle, hindsight: Hindsight | None) -> tuple[Referenc
 
     For metrics only: it reads the kinds that estimators and the verdict must not see.
     """
-    usable = [Reference(c.kind, c.topic, c.track) for c in candidates(bundle) if c.refusal is None]
+    usable = [
+        Reference(c.kind, c.topic, c.track, c.spatial)
+        for c in candidates(bundle)
+        if c.refusal is None
+    ]
     if hindsight is not None and hindsight.track.has_pose.any():
         usable.append(Reference("hindsight", "hindsight", hindsight.track))
     return tuple(usable)
@@ -126,12 +133,15 @@ def _candidate(
         position, R = position @ T[:3, :3].T + T[:3, 3], T[:3, :3] @ R
         cov, frame = ros_turned(cov, T[:3, :3]), target
     xyyaw = np.column_stack([position[:, :2], np.arctan2(R[:, 1, 0], R[:, 0, 0])])
+    T_frame_child = se3.from_parts(R, position)
+    spatial = SpatialTrack(frame, rows.t_ns, T_frame_child, cov.reshape(-1, 6, 6))
     refusal = None
     if kind in KINDS and child and child != base:
         refusal = "it says where the robot saw a thing"
     elif child and child != base and buffer.has_path(child, base):
         step, known = buffer.lookup(child, base, rows.t_ns)
         xyyaw = np.where(known[:, None], se2.compose(xyyaw, se3.planar(step)), np.nan)
+        spatial = spatial.mounted(np.where(known[:, None, None], step, np.nan))
         if not np.isfinite(xyyaw[:, :2]).any():
             refusal = f"where '{child}' is does not say where the robot is without a heading"
     elif child and child != base:
@@ -141,4 +151,5 @@ def _candidate(
     if T is None:
         refusal = f"its frame is '{frame}', and no static transform ties that to '{target}' (who "
         refusal += "knows it gives reference_in_map: [x_m, y_m, yaw_deg] in a topics file)"
-    return Candidate(kind, topic, track, refusal, only_frame)
+    in_space = spatial if spatial.leaves_plane else None
+    return Candidate(kind, topic, track, refusal, only_frame, in_space)

@@ -9,9 +9,9 @@ from slamreplay.consistency.answers import Answer, Suspicion, holm
 from slamreplay.consistency.context import CheckContext
 from slamreplay.consistency.credibility_index import CredibilityIndex, credibility_index
 from slamreplay.consistency.distribution import Distribution, distribution
-from slamreplay.consistency.evidence import Evidence
+from slamreplay.consistency.evidence import SPATIAL_AXES, Evidence
 from slamreplay.consistency.mean_test import MeanTest, mean_test
-from slamreplay.consistency.parts import Part, judged_parts
+from slamreplay.consistency.parts import SPATIAL_POSE, Part, judged_parts
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,7 +21,9 @@ class PartSummary:
     Attributes:
         name: pose, position, heading, rotation.
         mean: the mean NEES against its interval.
-        p_adjusted: its p-value after Holm's correction over all tests of the log; None where it was
+        p_value: of the mean; one-sided, that sigma is too small, where the covariance that was
+            claimed is only a bound.
+        p_adjusted: the same after Holm's correction over all tests of the log; None where it was
             not among them, as of sources that accuse nobody.
         distribution: of the squared errors; None without a valid row.
         index: the noncredibility index; None where the errors have too few rows or directions.
@@ -29,6 +31,7 @@ class PartSummary:
 
     name: str
     mean: MeanTest
+    p_value: float | None
     p_adjusted: float | None
     distribution: Distribution | None
     index: CredibilityIndex | None
@@ -36,11 +39,12 @@ class PartSummary:
 
 @dataclass(frozen=True, eq=False)
 class ConsistencySummary:
-    """A belief against one source; see `Evidence` for the first three."""
+    """A belief against one source; see `Evidence` for all but the parts."""
 
     source: str
     kind: str
     shared: bool
+    at_most: str
     parts: tuple[PartSummary, ...]
 
 
@@ -62,10 +66,13 @@ def consistency_summaries(
     summaries = []
     for evidence in context.evidence:
         parts = judged_parts(evidence, context.updates)
+        parts = (*parts, SPATIAL_POSE) if evidence.axes == SPATIAL_AXES else parts
         told = tuple(_part(evidence, part, adjusted) for part in parts)
         if any(part.mean.n for part in told):
             summaries.append(
-                ConsistencySummary(evidence.source, evidence.kind, evidence.shared, told)
+                ConsistencySummary(
+                    evidence.source, evidence.kind, evidence.shared, evidence.at_most, told
+                )
             )
     return tuple(summaries)
 
@@ -75,5 +82,8 @@ def _part(
 ) -> PartSummary:
     white = part.white(evidence)
     mean = mean_test(white)
-    p_adjusted = None if mean.p_value is None else adjusted.get((mean.mean, mean.p_value))
-    return PartSummary(part.name, mean, p_adjusted, distribution(white), credibility_index(white))
+    p_value = mean.p_small if evidence.at_most else mean.p_value
+    p_adjusted = None if p_value is None else adjusted.get((mean.mean, p_value))
+    return PartSummary(
+        part.name, mean, p_value, p_adjusted, distribution(white), credibility_index(white)
+    )

@@ -52,6 +52,21 @@ def ros_turned(covariance: ArrayLike, R_to_from: ArrayLike) -> Array:
     return out
 
 
+def ros_of_other_point(covariance: ArrayLike, lever: ArrayLike) -> Array:
+    """ROS covariances (..., 6, 6) of the pose of another frame that is fixed to the same body.
+
+    Its origin lies at `lever` (..., 3) from the first one's, along the parent's axes: a rotation
+    error moves it by d_theta x lever, and turns it as it turns the first one.
+    """
+    x, y, z = np.moveaxis(np.asarray(lever, dtype=np.float64), -1, 0)
+    J = np.zeros((*x.shape, 6, 6))
+    J[..., range(6), range(6)] = 1.0
+    J[..., 0, 4], J[..., 0, 5] = z, -y
+    J[..., 1, 3], J[..., 1, 5] = -z, x
+    J[..., 2, 3], J[..., 2, 4] = y, -x
+    return J @ np.asarray(covariance, dtype=np.float64) @ np.swapaxes(J, -1, -2)
+
+
 def gtsam_from_ros(covariance: ArrayLike, R_parent_body: ArrayLike) -> Array:
     """Gtsam Pose3 covariances (..., 6, 6) from ROS ones (..., 6, 6) and the pose's rotation.
 

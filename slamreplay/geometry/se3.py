@@ -42,9 +42,14 @@ def rotation_matrix(quaternion_xyzw: ArrayLike) -> Array:
 
 def matrix(translation_xyz: ArrayLike, quaternion_xyzw: ArrayLike) -> Array:
     """T (..., 4, 4) from translation (..., 3) in metres and quaternion (..., 4)."""
+    return from_parts(rotation_matrix(quaternion_xyzw), translation_xyz)
+
+
+def from_parts(R: ArrayLike, translation_xyz: ArrayLike) -> Array:
+    """T (..., 4, 4) from rotation matrices (..., 3, 3) and translations (..., 3) in metres."""
     translation = np.asarray(translation_xyz, dtype=np.float64)
     T = np.zeros((*translation.shape[:-1], 4, 4))
-    T[..., :3, :3] = rotation_matrix(quaternion_xyzw)
+    T[..., :3, :3] = R
     T[..., :3, 3] = translation
     T[..., 3, 3] = 1.0
     return T
@@ -59,6 +64,39 @@ def inverse(T_a_b: ArrayLike) -> Array:
     out[..., :3, 3] = -(R_t @ T[..., :3, 3:])[..., 0]
     out[..., 3, 3] = 1.0
     return out
+
+
+def rotation_vector(R: ArrayLike) -> Array:
+    """Axis times angle in rad, angle 0 to pi, of rotation matrices (..., 3, 3): their logarithm.
+
+    By way of the quaternion with the largest of its four components in the denominator, which is
+    good at every angle; by the skew part alone half turns would have no axis. NaN stays NaN.
+    """
+    R = np.asarray(R, dtype=np.float64)
+    trace = R[..., 0, 0] + R[..., 1, 1] + R[..., 2, 2]
+    # Row k is the quaternion x y z w times four times its k-th component.
+    scaled = np.empty((*R.shape[:-2], 4, 4))
+    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        scaled[..., i, i] = 1.0 + R[..., i, i] - R[..., j, j] - R[..., k, k]
+        scaled[..., i, j] = scaled[..., j, i] = R[..., i, j] + R[..., j, i]
+        scaled[..., i, 3] = scaled[..., 3, i] = R[..., k, j] - R[..., j, k]
+    scaled[..., 3, 3] = 1.0 + trace
+    largest = np.argmax(np.diagonal(scaled, axis1=-2, axis2=-1), axis=-1)
+    q = np.take_along_axis(scaled, largest[..., None, None], axis=-2)[..., 0, :]
+    q = q * np.where(q[..., 3:] < 0.0, -1.0, 1.0)
+    length = np.linalg.norm(q[..., :3], axis=-1, keepdims=True)
+    angle = 2.0 * np.arctan2(length, q[..., 3:])
+    # Without a turn there is no axis, and the vector is as good as twice the quaternion's.
+    return np.asarray(q[..., :3] * angle / np.where(length > 0.0, length, 1.0))
+
+
+def rotation_from_vector(vector: ArrayLike) -> Array:
+    """Rotation matrices (..., 3, 3) of axis times angle (..., 3) in rad: the exponential."""
+    v = np.asarray(vector, dtype=np.float64)
+    half = 0.5 * np.linalg.norm(v, axis=-1, keepdims=True)
+    # sinc is sin(pi x) / (pi x), and has its limit at zero.
+    q = np.concatenate([0.5 * v * np.sinc(half / np.pi), np.cos(half)], axis=-1)
+    return rotation_matrix(q)
 
 
 def quaternion_from_yaw(yaw: ArrayLike) -> Array:

@@ -26,7 +26,7 @@ def means(summaries: Summaries) -> Table:
             Cell(number(part.mean.ratio), _verdict(part)),
             f"{part.mean.n}",
             f"{part.mean.n_eff:.0f}",
-            _p(part.mean.p_value),
+            _p(part.p_value),
             _p(part.p_adjusted),
         )
         for summary, part in _rows(summaries)
@@ -69,6 +69,11 @@ def note(summaries: Summaries) -> str:
             " What shares evidence with the belief accuses it of gross over-confidence only, and "
             "never clears it."
         )
+    if any(summary.at_most and not summary.shared for summary in summaries):
+        text += (
+            " A bound is a source whose own errors are known at most: it may show that sigma is "
+            "too small, by the factor at least, and never that it is right or too large."
+        )
     return text
 
 
@@ -110,7 +115,9 @@ def _rows(summaries: Summaries) -> Iterator[tuple[ConsistencySummary, PartSummar
 
 
 def _source(summary: ConsistencySummary) -> Cell:
-    return Cell(summary.source, "shares its evidence" if summary.shared else "independent")
+    if summary.shared:
+        return Cell(summary.source, "shares its evidence")
+    return Cell(summary.source, "independent, a bound" if summary.at_most else "independent")
 
 
 def _verdict(part: PartSummary) -> str:

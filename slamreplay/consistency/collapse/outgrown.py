@@ -87,8 +87,9 @@ def outgrown(
 
 
 def _series(e: Evidence) -> Iterator[_Series]:
-    heading = [axis.startswith("yaw") for axis in e.axes]
-    for part, mask in (("position", [not h for h in heading]), ("heading", heading)):
+    position = [axis.endswith(" m") for axis in e.axes]
+    heading = [axis.startswith(("yaw", "rz")) for axis in e.axes]
+    for part, mask in (("position", position), ("heading", heading)):
         axes = np.flatnonzero(mask)
         if not len(axes):
             continue
