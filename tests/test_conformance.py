@@ -15,6 +15,7 @@ ESTIMATOR_LINES = {
     "amcl": (0.25, 0.15),
     "dead_reckoning": (1e-6, 1e-6),
     "ekf": (1e-6, 1e-6),
+    "ekf_tuned": (1e-3, 1e-3),
 }
 
 PERTURBATION_LINES = (

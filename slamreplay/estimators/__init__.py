@@ -8,5 +8,6 @@ ESTIMATORS = Registry(
         "amcl": "slamreplay.estimators.amcl.estimator:Amcl",
         "dead_reckoning": "slamreplay.estimators.dead_reckoning:DeadReckoning",
         "ekf": "slamreplay.estimators.ekf.estimator:Ekf",
+        "ekf_tuned": "slamreplay.estimators.ekf.estimator:EkfTuned",
     },
 )

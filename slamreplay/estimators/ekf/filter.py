@@ -242,7 +242,9 @@ class _Pass:
         if len(rows) < LEAST_AGREEING:
             return None
         steps = self.motion.steps(events.t_ns[window], self.noise)
-        R, thing = self.R[rows].copy(), seen.thing[rows]
+        thing = seen.thing[rows]
+        # Settings that are too sure of themselves must not keep a robot from finding its start.
+        R = np.maximum(self.R, seen.covariance(Noise()))[rows]
         # A lasting error is one and the same in all sightings of a thing: they share its weight.
         times = (thing[:, None] == thing[None, :]).sum(axis=1)
         R[:, 0, 0] += times * self.lasting[0] * self.polar[rows, 0] ** 2

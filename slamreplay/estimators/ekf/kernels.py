@@ -24,6 +24,26 @@ def wrapped(angle):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
+def of_moving(things, count, driven, turned, least_m, least_rad):  # type: ignore[no-untyped-def]
+    """(M,) which sightings come after some motion since the last one of the same thing.
+
+    Args: things (M,) below `count`; driven and turned (M,) on all the way, m and rad.
+    """
+    keep = np.zeros(len(things), dtype=np.bool_)
+    last = np.full(count, -1)
+    for i in range(len(things)):
+        before = last[things[i]]
+        if (
+            before < 0
+            or driven[i] - driven[before] >= least_m
+            or turned[i] - turned[before] >= least_rad
+        ):
+            keep[i] = True
+            last[things[i]] = i
+    return keep
+
+
+@njit(cache=True)
 def predict(x, P, step, Q):  # type: ignore[no-untyped-def]
     """Carry pose and covariance over an increment, in place.
 

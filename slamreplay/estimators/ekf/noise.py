@@ -8,7 +8,14 @@ from math import isfinite
 from slamreplay.errors import UsageError
 
 #: Attributes that may be negative: they are errors with a sign.
-_SIGNED = ("range_offset_m", "bearing_offset_rad", "odometry_delay_s", "turn_per_metre")
+_SIGNED = (
+    "range_offset_m",
+    "range_falloff",
+    "range_axis_rad",
+    "bearing_offset_rad",
+    "odometry_delay_s",
+    "turn_per_metre",
+)
 
 
 @dataclass(frozen=True)
@@ -36,6 +43,10 @@ class Noise:
         lasting_s: time constant with which lasting errors change, s.
         range_ratio: measured range divided by the true one.
         range_offset_m: metres added to every range.
+        range_falloff: share that a range lacks 1 rad beside the axis of the sensor, growing with
+            the square of the angle; a camera that tells depth along its axis, and calls it a range,
+            has about 0.5, for cos a is about 1 - a^2 / 2.
+        range_axis_rad: bearing of that axis in the base, rad.
         bearing_offset_rad: radians added to every bearing.
         odometry_delay_s: how long before the robot moves, on the clock of the sightings, odometry
             says that it does; commanded speeds and late cameras are positive.
@@ -58,6 +69,8 @@ class Noise:
     lasting_s: float = 5.0
     range_ratio: float = 1.0
     range_offset_m: float = 0.0
+    range_falloff: float = 0.0
+    range_axis_rad: float = 0.0
     bearing_offset_rad: float = 0.0
     odometry_delay_s: float = 0.0
     distance_ratio: float = 1.0

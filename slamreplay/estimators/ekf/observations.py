@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from slamreplay.bundle.sightings import Sightings
+from slamreplay.bundle.track import PoseTrack
+from slamreplay.estimators.ekf import kernels
 from slamreplay.estimators.ekf.kernels import NEAREST_M
 from slamreplay.estimators.ekf.noise import Noise
 from slamreplay.geometry import se2
+
+#: A range is never taken to lack more than all but this share of it.
+_LEAST = 0.2
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,6 +31,7 @@ class Observations:
         dims: (M,) 3 where the heading was sensed and is surveyed, else 2.
         stated: (M, 3, 3) covariance of `polar` that the log states, NaN where it does not.
         unsurveyed: sightings of things without a survey, which are left out.
+        repeated: sightings of a thing without any motion since the last one, left out too.
     """
 
     t_ns: NDArray[np.int64]
@@ -36,6 +42,7 @@ class Observations:
     dims: NDArray[np.int64]
     stated: se2.Array
     unsurveyed: int
+    repeated: int = 0
 
     def __len__(self) -> int:
         return len(self.t_ns)
@@ -51,13 +58,36 @@ class Observations:
             self.dims[index],
             self.stated[index],
             self.unsurveyed,
+            self.repeated,
         )
+
+    def of_moving(self, odometry: PoseTrack, least_m: float, least_rad: float) -> Observations:
+        """Without sightings of a thing from the very pose from which it was seen last.
+
+        A camera at rest sees the same pixels: what it gets wrong it gets wrong again, and a
+        hundred looks tell no more than one (nav2_amcl waits for motion, too).
+
+        Args:
+            odometry: base in odom.
+            least_m: a thing counts again after driving this far,
+            least_rad: or turning by this much.
+        """
+        step = np.diff(odometry.xyyaw, axis=0, prepend=odometry.xyyaw[:1])
+        driven = np.cumsum(np.hypot(step[:, 0], step[:, 1]))
+        turned = np.cumsum(np.abs(se2.wrap_angle(step[:, 2])))
+        at_ns = self.t_ns - odometry.t_ns[0]
+        driven, turned = (np.interp(at_ns, odometry.t_ns - odometry.t_ns[0], d)
+                          for d in (driven, turned))  # fmt: skip
+        keep = kernels.of_moving(self.thing, len(self.places), driven, turned, least_m, least_rad)
+        return replace(self.take(keep), repeated=int((~keep).sum()))
 
     def corrected(self, noise: Noise) -> se2.Array:
         """(M, 3) `polar` without its constant errors."""
         out = self.polar.copy()
-        out[:, 0] = np.maximum((out[:, 0] - noise.range_offset_m) / noise.range_ratio, NEAREST_M)
         out[:, 1] = se2.wrap_angle(out[:, 1] - noise.bearing_offset_rad)
+        beside = se2.wrap_angle(out[:, 1] - noise.range_axis_rad)
+        told = noise.range_ratio * np.maximum(1.0 - noise.range_falloff * beside**2, _LEAST)
+        out[:, 0] = np.maximum((out[:, 0] - noise.range_offset_m) / told, NEAREST_M)
         return out
 
     def covariance(self, noise: Noise, scale: float = 1.0) -> se2.Array:
