@@ -73,9 +73,9 @@ def postmortem(
     reference, kind = (None, None) if best is None else (best.track, best.kind)
     findings = [*judgement.findings, *unused_references(bundle, context.updates)]
     findings += sensed_references(bundle, found, hold_out)
-    undisturbed = (run for run in runs if run.trial.perturbation is None)
-    asked = [context, *(CheckContext.of_run(run, references, view) for run in undisturbed)]
-    answers = answered(asked)
+    of_runs = [CheckContext.of_run(run, references, view) for run in runs]
+    undisturbed = [c for c, run in zip(of_runs, runs, strict=True) if not run.trial.perturbation]
+    answers = answered([context, *undisturbed])
     findings += raised(answers)
     track = None if found is None else found.track
     trials = tuple(
@@ -83,10 +83,10 @@ def postmortem(
             run,
             {
                 **trial_metrics(run, runs, bundle),
-                **run_metrics(run, track, reference, limits),
+                **run_metrics(run, track, asked, limits),
             },
         )
-        for run in runs
+        for run, asked in zip(runs, of_runs, strict=True)
     )
     say("done", 1.0)
     return Postmortem(

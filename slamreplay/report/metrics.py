@@ -6,7 +6,8 @@ import numpy as np
 
 from slamreplay.bundle.run import Run
 from slamreplay.bundle.track import PoseTrack
-from slamreplay.consistency.belonging import several
+from slamreplay.consistency.context import CheckContext
+from slamreplay.consistency.credibility import nees_of_belief
 from slamreplay.consistency.nees import nees
 from slamreplay.verdict.limits import Limits
 
@@ -21,13 +22,19 @@ _NAMES = (
 
 
 def run_metrics(
-    run: Run, hindsight: PoseTrack | None, reference: PoseTrack | None, limits: Limits
+    run: Run, hindsight: PoseTrack | None, asked: CheckContext, limits: Limits
 ) -> dict[str, float | None]:
     """Numbers of one run, nothing aligned; None for what cannot be said.
 
     `hindsight_rmse_m`, `hindsight_max_m`, `hindsight_max_rad`: distance to where the robot really
     was; `lost_share`: of the rows beyond the limits of lost; `nees_mean` (x y yaw, 3 is expected)
-    and `nees_n_eff`: against the best reference of the log, rows of several clusters left out.
+    and `nees_n_eff`: of the run's updates against the best reference, as the checks have them.
+
+    Args:
+        run: of an estimator.
+        hindsight: where the robot really was.
+        asked: the run as the checks are given it.
+        limits: from where on it is lost.
     """
     metrics: dict[str, float | None] = dict.fromkeys(_NAMES)
     if run.estimate is None:
@@ -43,10 +50,9 @@ def run_metrics(
             metrics["hindsight_max_m"] = float(distance.max())
             metrics["hindsight_max_rad"] = float(turn.max())
             metrics["lost_share"] = float(off.mean())
-    if reference is not None:
-        clusters = run.estimate.diagnostics.get("clusters")
-        left_out = None if clusters is None else several(clusters)
-        summary = nees(track, reference, left_out=left_out).summary("joint").test
-        if summary.n:
-            metrics["nees_mean"], metrics["nees_n_eff"] = summary.mean, summary.n_eff
+    updates = nees_of_belief(asked)
+    if updates is not None:
+        test = updates.summary("joint").test
+        if test.n:
+            metrics["nees_mean"], metrics["nees_n_eff"] = test.mean, test.n_eff
     return metrics
