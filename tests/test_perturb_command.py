@@ -10,6 +10,7 @@ from slamreplay.bundle.schema import TABLES
 from slamreplay.bundle.store import write_bundle
 from slamreplay.cli import perturb
 from slamreplay.errors import OutputError, SlamreplayError, UsageError
+from slamreplay.estimators import ESTIMATORS
 from slamreplay.replay.folder import read_runs
 from slamreplay.testing.synthetic import synthetic_bundle
 
@@ -36,7 +37,7 @@ def test_baseline_stands_beside_each_perturbation(bundle, tmp_path):
     lines = [line.split() for line in ran.stdout.splitlines()]
     assert [line[:2] for line in lines[1:]] == [
         [estimator, what]
-        for estimator in ("amcl", "dead_reckoning")
+        for estimator in ESTIMATORS
         for what in ("(baseline)", "tf_delay.odometry", "initial_pose.global")
     ]
     assert lines[1][2:6] == ["0.000"] * 4
