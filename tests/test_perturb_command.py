@@ -42,7 +42,7 @@ def test_baseline_stands_beside_each_perturbation(bundle, tmp_path):
     ]
     assert lines[1][2:6] == ["0.000"] * 4
     assert "not applicable" in ran.stdout.splitlines()[-1]
-    assert len(read_runs(tmp_path / "R")[1]) == 6
+    assert len(read_runs(tmp_path / "R")[1]) == 3 * len(list(ESTIMATORS))
     assert not (tmp_path / "R" / "bundle").exists()  # it is where the user has it
 
 
