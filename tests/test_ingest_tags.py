@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from payloads import read_back
 
-from slamreplay.bundle.sightings import _covariance
+from slamreplay.bundle.sightings import _stated, _with_usual
 from slamreplay.ingest import DECODERS
 from slamreplay.ingest.decoders.decoder import Messages
 from slamreplay.messages.definitions import LATER_DEFINITIONS
@@ -146,8 +146,8 @@ def test_landmarks_without_an_orientation_may_point_anywhere(logs):
     assert np.isnan(covariance[1, :3, :3]).all()
     np.testing.assert_allclose(np.diag(covariance[1, 3:, 3:]), np.pi**2 / 3)
     assert told == {("skipped", "of no weight, says the detector"): 1}
-    usual, wide = _covariance(rows.columns["covariance"], np.tile(np.eye(3), (2, 1, 1)),
-                              rows.columns["position_xyz"][:, :2])  # fmt: skip
+    stated = _stated(rows.columns["covariance"], np.tile(np.eye(3), (2, 1, 1)))
+    usual, wide = _with_usual(stated, rows.columns["position_xyz"][:, :2])
     np.testing.assert_array_equal(usual[:2, :2], wide[:2, :2])
     np.testing.assert_allclose(wide[2, 2] - usual[2, 2], np.pi**2 / 3)
 
