@@ -14,11 +14,11 @@ from slamreplay.bundle.run import Run
 from slamreplay.bundle.view import Bundle, BundleView
 from slamreplay.consistency.answers import raised
 from slamreplay.consistency.asking import answered
+from slamreplay.consistency.belief.credibility import nees_of_belief
+from slamreplay.consistency.belief.summary import consistency_summaries
 from slamreplay.consistency.context import CheckContext
-from slamreplay.consistency.credibility import nees_of_belief
-from slamreplay.consistency.references import references_of, unused_references
-from slamreplay.consistency.sensed import sensed_references
-from slamreplay.consistency.summary import consistency_summaries
+from slamreplay.consistency.evidence.references import references_of, unused_references
+from slamreplay.consistency.evidence.sensed import sensed_references
 from slamreplay.hindsight.pipeline import hindsight
 from slamreplay.replay.metrics import trial_metrics
 from slamreplay.report.evidence import Postmortem, TrialResult

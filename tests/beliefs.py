@@ -5,7 +5,7 @@ from scipy.signal import lfilter
 
 from slamreplay.bundle.track import PoseTrack
 from slamreplay.consistency.context import CheckContext
-from slamreplay.consistency.evidence import Reference
+from slamreplay.consistency.evidence.source import Reference
 from slamreplay.geometry import se2
 from slamreplay.testing.synthetic import synthetic_bundle
 

@@ -7,7 +7,7 @@ from slamreplay.bundle.schema import TABLES
 from slamreplay.bundle.tables import Table
 from slamreplay.bundle.track import PoseTrack
 from slamreplay.consistency.context import CheckContext
-from slamreplay.consistency.evidence import Reference
+from slamreplay.consistency.evidence.source import Reference
 from slamreplay.geometry import se2, se3
 from slamreplay.geometry.covariance import ros_from_planar
 from slamreplay.testing.edits import rebuilt

@@ -17,7 +17,7 @@ from slamreplay.bundle.manifest import Clock
 from slamreplay.bundle.schema import TABLES, Column, TableSchema
 from slamreplay.bundle.tables import Table
 from slamreplay.bundle.view import Bundle
-from slamreplay.consistency.clock import _jumps as clock_jumps
+from slamreplay.consistency.audits.clock import _jumps as clock_jumps
 from slamreplay.geometry.times import NO_STAMP, NS_PER_S
 from slamreplay.testing.synthetic import START_NS
 
@@ -376,7 +376,7 @@ def test_what_a_clock_topic_says_is_used_where_there_is_one(sound, monkeypatch, 
     tables = {name: simulated.table(name) for name in TABLES if name != "clock"}
     bundle = Bundle(simulated.manifest, {**tables, "clock": table}, {})
 
-    from slamreplay.consistency.inspection import inspect
+    from slamreplay.consistency.audits.inspection import inspect
 
     message = findings(bundle, "clock")[0][2]
     assert ("as /clock says" in message) == follows
@@ -386,7 +386,7 @@ def test_what_a_clock_topic_says_is_used_where_there_is_one(sound, monkeypatch, 
 
 
 def test_without_a_clock_topic_nothing_is_said_of_one(sound):
-    from slamreplay.consistency.inspection import inspect
+    from slamreplay.consistency.audits.inspection import inspect
 
     assert inspect(sound)["clock"]["simulated"] is None
 

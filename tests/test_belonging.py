@@ -9,12 +9,12 @@ from slamreplay.bundle.schema import TABLES
 from slamreplay.bundle.tables import Ragged, Table
 from slamreplay.bundle.track import PoseTrack
 from slamreplay.bundle.view import Bundle
-from slamreplay.consistency.amcl_limits import amcl_limits, is_amcl
 from slamreplay.consistency.asking import ask
-from slamreplay.consistency.cloud_parts import mixed_up
+from slamreplay.consistency.belief.amcl_limits import amcl_limits, is_amcl
+from slamreplay.consistency.belief.credibility import nees_of_belief
 from slamreplay.consistency.context import CheckContext
-from slamreplay.consistency.credibility import nees_of_belief
-from slamreplay.consistency.nees import ANY_HEADING, nees
+from slamreplay.consistency.evidence.cloud_parts import mixed_up
+from slamreplay.consistency.evidence.nees import ANY_HEADING, nees
 from slamreplay.estimators.amcl.cloud import cluster_of, moments
 from slamreplay.estimators.amcl.config import AmclConfig
 from slamreplay.estimators.amcl.filter import AmclFilter

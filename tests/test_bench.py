@@ -18,7 +18,10 @@ from slamreplay.bench.schedule import DEFAULT_LOGS, HELD_FROM, Case, schedule
 from slamreplay.bench.scores import calibration, hindsight_size, named, scores
 from slamreplay.bench.store import read_measured, write_measured
 from slamreplay.bench.table import page
-from slamreplay.consistency.hindsight_size import hindsight_size_of, measured_hindsight_size
+from slamreplay.consistency.evidence.hindsight_size import (
+    hindsight_size_of,
+    measured_hindsight_size,
+)
 from slamreplay.errors import OutputError, UsageError
 from slamreplay.verdict.reliability import measured_reliability, reliability_of
 

@@ -21,17 +21,17 @@ from slamreplay.bundle.run import Innovations
 from slamreplay.bundle.schema import TABLES
 from slamreplay.bundle.tables import Table
 from slamreplay.bundle.track import PoseTrack
-from slamreplay.consistency.amcl_limits import is_amcl
 from slamreplay.consistency.answers import raised
 from slamreplay.consistency.asking import ask
-from slamreplay.consistency.collapse.check import check
-from slamreplay.consistency.collapse.episodes import scan
-from slamreplay.consistency.collapse.floor import sensor_floor
-from slamreplay.consistency.collapse.stretch import Stretch, merged
+from slamreplay.consistency.belief.amcl_limits import is_amcl
+from slamreplay.consistency.belief.collapse.check import check
+from slamreplay.consistency.belief.collapse.episodes import scan
+from slamreplay.consistency.belief.collapse.floor import sensor_floor
+from slamreplay.consistency.belief.collapse.stretch import Stretch, merged
 from slamreplay.consistency.context import CheckContext
-from slamreplay.consistency.evidence import Reference
-from slamreplay.consistency.references import references_of
-from slamreplay.consistency.sign_correlation import sign_correlation, squares_time
+from slamreplay.consistency.evidence.references import references_of
+from slamreplay.consistency.evidence.source import Reference
+from slamreplay.consistency.statistics.sign_correlation import sign_correlation, squares_time
 from slamreplay.geometry import se2
 from slamreplay.ingest.pipeline import ingest
 from slamreplay.testing.edits import rebuilt

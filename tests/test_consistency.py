@@ -14,13 +14,16 @@ from slamreplay.bundle.view import Bundle
 from slamreplay.consistency import CHECKS
 from slamreplay.consistency.answers import Suspicion, holm, raised
 from slamreplay.consistency.asking import ask
+from slamreplay.consistency.belief.credibility import nees_of_belief
 from slamreplay.consistency.context import CheckContext
-from slamreplay.consistency.credibility import nees_of_belief
-from slamreplay.consistency.effective_samples import autocorrelation_time, effective_samples
-from slamreplay.consistency.evidence import Reference
-from slamreplay.consistency.nees import nees
-from slamreplay.consistency.published import fresh_rows, published_belief
-from slamreplay.consistency.references import references_of, unused_references
+from slamreplay.consistency.evidence.nees import nees
+from slamreplay.consistency.evidence.published import fresh_rows, published_belief
+from slamreplay.consistency.evidence.references import references_of, unused_references
+from slamreplay.consistency.evidence.source import Reference
+from slamreplay.consistency.statistics.effective_samples import (
+    autocorrelation_time,
+    effective_samples,
+)
 from slamreplay.geometry import se2, se3
 from slamreplay.geometry.covariance import ros_from_planar, turned
 

@@ -7,9 +7,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from slamreplay.consistency.answers import raised
-from slamreplay.consistency.credibility_index import credibility_index
-from slamreplay.consistency.credible import check
-from slamreplay.consistency.parts import POSE
+from slamreplay.consistency.belief.credible import check
+from slamreplay.consistency.evidence.parts import POSE
+from slamreplay.consistency.statistics.credibility_index import credibility_index
 
 NORMAL = np.random.default_rng(8).standard_normal((600, 3))
 
@@ -90,7 +90,7 @@ def test_a_bias_counts_as_error():
 
 def test_p_values_are_uniform_for_independent_credible_errors():
     # By how often they fall below 5 % and 50 %, for the samples there really are.
-    from slamreplay.consistency.credibility_index import _p_values
+    from slamreplay.consistency.statistics.credibility_index import _p_values
 
     rng = np.random.default_rng(2)
     draws = rng.standard_normal((3000, 25, 3))

@@ -9,14 +9,14 @@ from hypothesis.extra.numpy import arrays
 from scipy.stats import chi2, kstest
 
 from slamreplay.consistency.answers import raised
-from slamreplay.consistency.distribution import (
+from slamreplay.consistency.belief.shape import check
+from slamreplay.consistency.statistics.distribution import (
     LEVELS,
     distribution,
     ks_distance,
     ks_p_value,
 )
-from slamreplay.consistency.error_samples import error_samples
-from slamreplay.consistency.shape import check
+from slamreplay.consistency.statistics.error_samples import error_samples
 
 NORMAL = np.random.default_rng(5).standard_normal((400, 3))
 
@@ -148,7 +148,7 @@ def test_a_few_wild_errors_with_the_right_variance_are_found():
 
 
 def test_errors_that_are_all_of_one_size_are_found_although_their_mean_is_right():
-    from slamreplay.consistency.credibility import check as mean_is_tested
+    from slamreplay.consistency.belief.credibility import check as mean_is_tested
 
     made = context(alike(np.random.default_rng(0), 400, 3))
     (finding,) = raised(check(made))

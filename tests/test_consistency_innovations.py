@@ -9,15 +9,15 @@ from scipy.stats import chi2, t, truncnorm, ttest_1samp
 
 from slamreplay.bundle.run import Innovations
 from slamreplay.bundle.track import PoseTrack
-from slamreplay.consistency import innovation_bias
+from slamreplay.consistency.innovations import innovation_bias
 from slamreplay.consistency.asking import ask
 from slamreplay.consistency.context import CheckContext
-from slamreplay.consistency.innovation_bias import bias_of
-from slamreplay.consistency.innovation_sets import innovation_sets
-from slamreplay.consistency.mean_test import mean_test
-from slamreplay.consistency.nis import nis_tests
-from slamreplay.consistency.truncation import SCALE_MAX, Truncation
-from slamreplay.consistency.whiteness import whiteness
+from slamreplay.consistency.innovations.innovation_bias import bias_of
+from slamreplay.consistency.innovations.innovation_sets import innovation_sets
+from slamreplay.consistency.innovations.nis import nis_tests
+from slamreplay.consistency.innovations.whiteness import whiteness
+from slamreplay.consistency.statistics.mean_test import mean_test
+from slamreplay.consistency.statistics.truncation import SCALE_MAX, Truncation
 
 GATE = chi2.ppf(0.99, 1)
 

@@ -6,10 +6,14 @@ from scipy.linalg import solve_toeplitz, toeplitz
 from scipy.signal import lfilter
 from scipy.stats import binom, chi2
 
-from slamreplay.consistency.autoregression import autocorrelation_of, burg, chosen_reflection
-from slamreplay.consistency.error_samples import ErrorSamples, error_samples
-from slamreplay.consistency.intervals import mean_interval
-from slamreplay.consistency.mean_test import N_EFF_MIN, mean_test
+from slamreplay.consistency.statistics.autoregression import (
+    autocorrelation_of,
+    burg,
+    chosen_reflection,
+)
+from slamreplay.consistency.statistics.error_samples import ErrorSamples, error_samples
+from slamreplay.consistency.statistics.intervals import mean_interval
+from slamreplay.consistency.statistics.mean_test import N_EFF_MIN, mean_test
 
 
 def ar1(rng, n, rho, dof):

@@ -9,7 +9,7 @@ from slamreplay.bundle.costmaps import Costmaps
 from slamreplay.bundle.schema import TABLES
 from slamreplay.bundle.tables import Table
 from slamreplay.cli.inspect import show
-from slamreplay.consistency.inspection import inspect
+from slamreplay.consistency.audits.inspection import inspect
 from slamreplay.ingest import map_versions
 from slamreplay.ingest.options import IngestOptions
 from slamreplay.ingest.pipeline import ingest

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from scipy.stats import chi2
 
 from slamreplay.bundle.track import PoseTrack
-from slamreplay.consistency.nees import nees
+from slamreplay.consistency.evidence.nees import nees
 from slamreplay.errors import UsageError
 from slamreplay.estimators import kalman
 from slamreplay.estimators.ekf import kernels

@@ -31,19 +31,19 @@ from slamreplay.bundle.run import Innovations
 from slamreplay.bundle.schema import TABLES
 from slamreplay.bundle.tables import Table
 from slamreplay.bundle.track import PoseTrack
-from slamreplay.consistency import gathering
-from slamreplay.consistency.carried import carried
+from slamreplay.consistency.evidence import gathering
+from slamreplay.consistency.belief.credibility import check
 from slamreplay.consistency.context import CheckContext
-from slamreplay.consistency.credibility import check
-from slamreplay.consistency.evidence import Reference
-from slamreplay.consistency.gathering import evidence_of
-from slamreplay.consistency.hindsight_size import HindsightSize
-from slamreplay.consistency.laid_onto import laid_onto
-from slamreplay.consistency.mean_test import mean_test
-from slamreplay.consistency.published import published_belief
-from slamreplay.consistency.references import references_of, unused_references
-from slamreplay.consistency.standing_still import against_the_past, things, visits
-from slamreplay.consistency.whitening import whitened
+from slamreplay.consistency.evidence.carried import carried
+from slamreplay.consistency.evidence.gathering import evidence_of
+from slamreplay.consistency.evidence.hindsight_size import HindsightSize
+from slamreplay.consistency.evidence.laid_onto import laid_onto
+from slamreplay.consistency.evidence.published import published_belief
+from slamreplay.consistency.evidence.references import references_of, unused_references
+from slamreplay.consistency.evidence.source import Reference
+from slamreplay.consistency.evidence.standing_still import against_the_past, things, visits
+from slamreplay.consistency.statistics.mean_test import mean_test
+from slamreplay.consistency.statistics.whitening import whitened
 from slamreplay.geometry import se2
 from slamreplay.geometry.covariance import composed, ros_from_planar
 from slamreplay.testing.edits import poisoned

@@ -9,7 +9,7 @@ import yaml
 
 from slamreplay.bundle.belief import recorded_belief
 from slamreplay.bundle.format_page import format_page
-from slamreplay.consistency.inspection import inspect
+from slamreplay.consistency.audits.inspection import inspect
 from slamreplay.errors import LogError, MapError, OutputError, SlamreplayError, UsageError
 from slamreplay.ingest.options import IngestOptions
 from slamreplay.ingest.pipeline import ingest

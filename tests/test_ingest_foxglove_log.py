@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 
 from slamreplay.bundle.view import Bundle
 from slamreplay.cli import ingest as ingest_command
-from slamreplay.consistency.inspection import inspect
+from slamreplay.consistency.audits.inspection import inspect
 from slamreplay.errors import UsageError
 from slamreplay.ingest.options import IngestOptions
 from slamreplay.ingest.pipeline import ingest

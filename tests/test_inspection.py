@@ -12,7 +12,7 @@ from slamreplay.bundle.schema import TABLES
 from slamreplay.cli import explain
 from slamreplay.cli import inspect as inspect_command
 from slamreplay.consistency import AUDITS, CHECKS
-from slamreplay.consistency.inspection import inspect, summary
+from slamreplay.consistency.audits.inspection import inspect, summary
 from slamreplay.geometry.times import NO_STAMP
 from slamreplay.ingest.options import IngestOptions
 from slamreplay.ingest.pipeline import ingest

@@ -14,12 +14,12 @@ from slamreplay.bundle.tables import Table
 from slamreplay.bundle.view import Bundle
 from slamreplay.consistency.asking import ask
 from slamreplay.consistency.context import CheckContext
-from slamreplay.consistency.evidence import MAP_AXES, SPATIAL_AXES
-from slamreplay.consistency.nees_spatial import spatial_errors
-from slamreplay.consistency.published import published_belief
-from slamreplay.consistency.references import references_of
-from slamreplay.consistency.spatial_track import SpatialTrack
-from slamreplay.consistency.whitening import whitened
+from slamreplay.consistency.evidence.nees_spatial import spatial_errors
+from slamreplay.consistency.evidence.published import published_belief
+from slamreplay.consistency.evidence.references import references_of
+from slamreplay.consistency.evidence.source import MAP_AXES, SPATIAL_AXES
+from slamreplay.consistency.evidence.spatial_track import SpatialTrack
+from slamreplay.consistency.statistics.whitening import whitened
 from slamreplay.geometry import se3
 from slamreplay.geometry.covariance import gtsam_from_ros, ros_from_gtsam, ros_turned
 

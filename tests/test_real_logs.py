@@ -5,7 +5,7 @@ import pytest
 
 from slamreplay.bench import inject, moments, real_rows
 from slamreplay.bundle.scans import scan_set
-from slamreplay.consistency.sensed import sensed_references
+from slamreplay.consistency.evidence.sensed import sensed_references
 from slamreplay.geometry import se2, se3
 from slamreplay.geometry.times import NS_PER_S, ns
 from slamreplay.hindsight.pipeline import hindsight

@@ -20,7 +20,7 @@ from slamreplay.bundle.manifest import Source
 from slamreplay.bundle.products import ChangedRegion, Changes, Hindsight
 from slamreplay.bundle.run import Estimate, Run, Trial
 from slamreplay.bundle.track import PoseTrack
-from slamreplay.consistency.nees import nees
+from slamreplay.consistency.evidence.nees import nees
 from slamreplay.errors import OutputError
 from slamreplay.maps.map_server import read_map
 from slamreplay.report.assess import not_assessable

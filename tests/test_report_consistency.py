@@ -9,9 +9,9 @@ from beliefs import APART, COUPLED, ar1, context
 from slamreplay.bundle.track import PoseTrack
 from slamreplay.consistency.answers import raised
 from slamreplay.consistency.asking import answered
-from slamreplay.consistency.distribution import distribution
-from slamreplay.consistency.evidence import Reference
-from slamreplay.consistency.summary import consistency_summaries
+from slamreplay.consistency.belief.summary import consistency_summaries
+from slamreplay.consistency.evidence.source import Reference
+from slamreplay.consistency.statistics.distribution import distribution
 from slamreplay.report import consistency_tables
 from slamreplay.report.figures import canvas
 from slamreplay.report.figures.consistency import bar_band, consistency_figure, drawn_parts

@@ -19,7 +19,7 @@ from slamreplay.bundle.products import ChangedRegion, Hindsight
 from slamreplay.bundle.scans import scan_set
 from slamreplay.bundle.track import PoseTrack
 from slamreplay.bundle.view import BundleView
-from slamreplay.consistency.whitening import whitened
+from slamreplay.consistency.statistics.whitening import whitened
 from slamreplay.geometry import se2
 from slamreplay.geometry.times import ns
 from slamreplay.hindsight.pipeline import hindsight

@@ -29,7 +29,7 @@ from slamreplay.verdict.reliability import Bin, Reliability
 
 RESULTS, PAGE, LOGS, FAILURES = "results.json", "results.md", "logs", "failures"
 RELIABILITY, DIAGRAM = "reliability.json", "reliability.svg"
-#: The record that `slamreplay.consistency.hindsight_size` ships with, from logs to develop with.
+#: The record that `consistency.evidence.hindsight_size` ships with, from logs to develop with.
 HINDSIGHT_SIZE = "hindsight_size.json"
 #: Kinds that are a hard condition by themselves.
 _HARD_KINDS = ("half_changed",)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from slamreplay.bench.baselines import FIELD_THRESHOLDS
 from slamreplay.bench.measure import Measured
 from slamreplay.bench.rates import Rate, auc, best_f1, clustered, f1, share
-from slamreplay.consistency.hindsight_size import HindsightSize
+from slamreplay.consistency.evidence.hindsight_size import HindsightSize
 from slamreplay.verdict.reliability import Bin
 
 FOUR = ("healthy", "lost", "map_changed", "lost_and_map_changed")

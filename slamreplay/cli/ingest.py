@@ -31,7 +31,7 @@ def ingest(
     """Read a log into a bundle: immutable, columnar, hashed."""
     from slamreplay.cli.inspect import show
     from slamreplay.cli.progress import progress_bar
-    from slamreplay.consistency.inspection import inspect, summary
+    from slamreplay.consistency.audits.inspection import inspect, summary
     from slamreplay.ingest.pipeline import ingest as run
 
     given = o.ingest_options(

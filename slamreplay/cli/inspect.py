@@ -30,7 +30,7 @@ def inspect(
     json: o.Json = False,
 ) -> None:
     """Show what is in a bundle or log, what is missing, and whether its clocks and tf hold."""
-    from slamreplay.consistency.inspection import inspect as look
+    from slamreplay.consistency.audits.inspection import inspect as look
 
     given = o.ingest_options(
         map_yaml=map_yaml, topics=topics, robot=robot, reference=reference, start_s=start, end_s=end

@@ -15,13 +15,13 @@ from slamreplay.bundle.run import Innovations, Run
 from slamreplay.bundle.schema import SENSED_KINDS
 from slamreplay.bundle.track import PoseTrack
 from slamreplay.bundle.view import BundleView
-from slamreplay.consistency.belonging import (
+from slamreplay.consistency.evidence.belonging import (
     Belonging,
     belonging_of_robot,
     belonging_of_run,
 )
-from slamreplay.consistency.evidence import Evidence, Reference
-from slamreplay.consistency.gathering import evidence_of, updates_of
+from slamreplay.consistency.evidence.gathering import evidence_of, updates_of
+from slamreplay.consistency.evidence.source import Evidence, Reference
 from slamreplay.geometry.se2 import Array
 
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from slamreplay.bundle.findings import FINDINGS
-from slamreplay.consistency.evidence import SHARED_KINDS
-from slamreplay.consistency.nees import PARTS
+from slamreplay.consistency.evidence.nees import PARTS
+from slamreplay.consistency.evidence.source import SHARED_KINDS
 from slamreplay.report.evidence import Postmortem
 
 _NEEDS_BELIEF = ("SR-LOC-001", "SR-MAP-FRAME", "SR-CON-001", "SR-CON-002")

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from slamreplay.consistency.distribution import LEVELS
-from slamreplay.consistency.summary import ConsistencySummary, PartSummary
+from slamreplay.consistency.belief.summary import ConsistencySummary, PartSummary
+from slamreplay.consistency.statistics.distribution import LEVELS
 from slamreplay.report.figures.consistency import drawn_parts
 from slamreplay.report.phrases import NOT_KNOWN, number, short
 from slamreplay.report.tables import Cell, Table, table

@@ -14,8 +14,8 @@ from slamreplay.bundle.manifest import Manifest
 from slamreplay.bundle.products import Hindsight
 from slamreplay.bundle.run import Run
 from slamreplay.bundle.track import PoseTrack
-from slamreplay.consistency.nees import Nees
-from slamreplay.consistency.summary import ConsistencySummary
+from slamreplay.consistency.belief.summary import ConsistencySummary
+from slamreplay.consistency.evidence.nees import Nees
 from slamreplay.geometry import se2
 from slamreplay.geometry.times import seconds_since
 from slamreplay.maps.grid import OccupancyGrid

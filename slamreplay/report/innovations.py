@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from slamreplay.bundle.run import Trial
-from slamreplay.consistency.innovation_bias import bias_of, readable
-from slamreplay.consistency.innovation_sets import InnovationSet, innovation_sets
-from slamreplay.consistency.mean_test import MeanTest
-from slamreplay.consistency.nis import nis_tests
-from slamreplay.consistency.whiteness import LEAST, whiteness
+from slamreplay.consistency.innovations.innovation_bias import bias_of, readable
+from slamreplay.consistency.innovations.innovation_sets import InnovationSet, innovation_sets
+from slamreplay.consistency.innovations.nis import nis_tests
+from slamreplay.consistency.innovations.whiteness import LEAST, whiteness
+from slamreplay.consistency.statistics.mean_test import MeanTest
 from slamreplay.report.evidence import Postmortem
 from slamreplay.report.phrases import NOT_KNOWN, number, percent
 from slamreplay.report.tables import Cell, Table, table

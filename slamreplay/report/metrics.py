@@ -6,9 +6,9 @@ import numpy as np
 
 from slamreplay.bundle.run import Run
 from slamreplay.bundle.track import PoseTrack
+from slamreplay.consistency.belief.credibility import nees_of_belief
 from slamreplay.consistency.context import CheckContext
-from slamreplay.consistency.credibility import nees_of_belief
-from slamreplay.consistency.nees import nees
+from slamreplay.consistency.evidence.nees import nees
 from slamreplay.verdict.limits import Limits
 
 _NAMES = (

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from slamreplay.consistency.intervals import mean_interval
+from slamreplay.consistency.statistics.intervals import mean_interval
 from slamreplay.geometry.se2 import Array
 from slamreplay.labs.covariance_breathing.corridor import Chain, Drive, Wall
 from slamreplay.labs.covariance_breathing.rules import Rules

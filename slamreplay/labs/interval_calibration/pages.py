@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from matplotlib.figure import Figure
 
 from slamreplay.consistency.answers import P_ACCUSE
-from slamreplay.consistency.mean_test import N_EFF_MIN, NOMINAL
+from slamreplay.consistency.statistics.mean_test import N_EFF_MIN, NOMINAL
 from slamreplay.labs.interval_calibration.trials import Cell, share_interval
 from slamreplay.labs.lab import LabResults, ResultTable
 from slamreplay.report.figures.calibration import Curve, calibration_figure

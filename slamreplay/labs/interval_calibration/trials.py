@@ -10,8 +10,8 @@ from scipy.signal import lfilter
 from scipy.special import bdtri
 
 from slamreplay.consistency.answers import P_ACCUSE
-from slamreplay.consistency.intervals import mean_interval
-from slamreplay.consistency.mean_test import NOMINAL, mean_test
+from slamreplay.consistency.statistics.intervals import mean_interval
+from slamreplay.consistency.statistics.mean_test import NOMINAL, mean_test
 from slamreplay.geometry.se2 import Array
 
 

@@ -9,9 +9,9 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from scipy.special import betaincinv
 
-from slamreplay.consistency.distribution import LEVELS, Distribution
-from slamreplay.consistency.mean_test import NOMINAL
-from slamreplay.consistency.summary import ConsistencySummary
+from slamreplay.consistency.belief.summary import ConsistencySummary
+from slamreplay.consistency.statistics.distribution import LEVELS, Distribution
+from slamreplay.consistency.statistics.mean_test import NOMINAL
 from slamreplay.report.figures import canvas
 from slamreplay.report.figures.canvas import BLUE, FAINT, SKY, VERMILLION
 

@@ -1,0 +1,1 @@
+"""Checks of the log itself: clocks, transforms, numbers, and what is missing."""

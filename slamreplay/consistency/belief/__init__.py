@@ -1,0 +1,1 @@
+"""Checks of a belief: its covariance against its errors."""

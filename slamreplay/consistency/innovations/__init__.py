@@ -1,0 +1,1 @@
+"""Checks of what measurements said against an estimator's predictions."""

@@ -1,0 +1,1 @@
+"""What errors that hang together in time can tell: intervals, tests, distributions."""
