@@ -328,6 +328,7 @@ def test_hindsights_size_counts_each_log_alike(tmp_path):
     assert size.position == pytest.approx(np.sqrt((1.0 + 1.0 + 9.0) / 3.0), rel=0.1)
     assert size.typical_position == pytest.approx(1.0, rel=0.1)
     assert size.heading == pytest.approx(0.5, rel=0.1)
+    assert size.typical_position < size.position < size.most_position < 3.2
     assert hindsight_size([made_up()], 3, "train") is None
     write_measured(tmp_path, logs[1], "code")
     kept = read_measured(tmp_path, logs[1].case, "code")

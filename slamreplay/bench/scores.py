@@ -276,5 +276,6 @@ def hindsight_size(logs: Sequence[Measured], seed: int, split: str) -> Hindsight
             factors.append([float(told[0].mean()) / 2.0, float(told[1].mean())])
     if not factors:
         return None
-    mean, middle = np.sqrt(np.mean(factors, axis=0)), np.sqrt(np.median(factors, axis=0))
-    return HindsightSize(len(factors), seed, split, *mean.tolist(), *middle.tolist())
+    sizes = (np.mean(factors, axis=0), *np.quantile(factors, (0.5, 0.95), axis=0))
+    numbers = np.sqrt(np.concatenate(sizes)).tolist()
+    return HindsightSize(len(factors), seed, split, *numbers)

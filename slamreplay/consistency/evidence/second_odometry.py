@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slamreplay.bundle.odometry import topic_track
+from slamreplay.bundle.tables import Table
 from slamreplay.bundle.track import PoseTrack
 from slamreplay.bundle.view import BundleView
 from slamreplay.consistency.evidence.carried import SLIP, driven
@@ -20,6 +21,8 @@ _WINDOW_S, _LONGEST_S = 5.0, 10.0
 _ANY_M, _ANY_RAD = 0.02, 0.02
 #: An odometry whose motion over a window differs by less, in most windows, is the same one again.
 _SAME_M, _SAME_RAD = 2e-3, 2e-3
+#: Vertical motion above this part of the whole is no base's: the axes are a camera's.
+_VERTICAL = 0.3
 #: Fewer windows tell nothing.
 _LEAST = 3
 
@@ -40,8 +43,11 @@ def second_odometry(
     start, end = _windows(updates)
     found = []
     for topic in sorted(set(table["topic"].astype(str))):
-        track = topic_track(view, table.take(table["topic"] == topic))
-        if not len(track) or len(start) < _LEAST:
+        rows = table.take(table["topic"] == topic)
+        if len(start) < _LEAST or not _is_of_base(view, rows):
+            continue
+        track = topic_track(view, rows)
+        if not len(track):
             continue
         step, way = driven(track, updates.t_ns[start], updates.t_ns[end])
         known = np.isfinite(step).all(axis=1)
@@ -56,6 +62,15 @@ def second_odometry(
         found.append(Evidence(f"second odometry {topic}", "second_odometry", updates.t_ns[e],
                               error, cov, _AXES, _BOTH_ENDS))  # fmt: skip
     return tuple(found)
+
+
+def _is_of_base(view: BundleView, rows: Table) -> bool:
+    """Whether it is told where on the robot what it moves sits, and it moves in the plane."""
+    base, child = view.manifest.frames.base, str(rows["child_frame_id"][0])
+    if base and child not in ("", base) and not view.transforms.has_path(child, base):
+        return False
+    spread = np.ptp(rows["position_xyz"], axis=0)
+    return bool(spread[2] <= _VERTICAL * np.linalg.norm(spread))
 
 
 def _windows(updates: PoseTrack) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

@@ -20,7 +20,7 @@ from slamreplay.geometry.transforms import clean_frame
 WITHIN_S = 0.5
 #: Sightings under one name that a belief puts farther apart than this are of two things.
 ONE_THING_M = 2.0
-#: A belief of which this share of updates bears the very stamps of sightings is made of them.
+#: A belief of which this share of updates bears the very stamps of sightings may be made of them.
 _SAME_STAMPS = 0.5
 #: So many names are spelt out.
 _NAMES = 3
@@ -45,8 +45,8 @@ def sighted(updates: PoseTrack, view: BundleView, motion: PoseTrack | None) -> t
         rows = np.flatnonzero(seen.kind == kind)
         if not len(rows):
             continue
-        if _made_of(updates, seen.t_ns[rows]):
-            why = "it bears the very stamps of these sightings, so both come of one measurement"
+        if _may_be_made_of(updates, seen.t_ns[rows]):
+            why = "its updates bear their very stamps, as those of a belief made of them would"
             found.append(Evidence.refused(f"sightings of {kind}s", kind, why))
             continue
         at = carried(
@@ -59,7 +59,7 @@ def sighted(updates: PoseTrack, view: BundleView, motion: PoseTrack | None) -> t
     return tuple(found)
 
 
-def _made_of(updates: PoseTrack, t_ns: NDArray[np.int64]) -> bool:
+def _may_be_made_of(updates: PoseTrack, t_ns: NDArray[np.int64]) -> bool:
     return bool(np.isin(updates.t_ns, t_ns).mean() >= _SAME_STAMPS)
 
 
