@@ -9,9 +9,9 @@ from scipy.stats import chi2, t, truncnorm, ttest_1samp
 
 from slamreplay.bundle.run import Innovations
 from slamreplay.bundle.track import PoseTrack
-from slamreplay.consistency.innovations import innovation_bias
 from slamreplay.consistency.asking import ask
 from slamreplay.consistency.context import CheckContext
+from slamreplay.consistency.innovations import innovation_bias
 from slamreplay.consistency.innovations.innovation_bias import bias_of
 from slamreplay.consistency.innovations.innovation_sets import innovation_sets
 from slamreplay.consistency.innovations.nis import nis_tests

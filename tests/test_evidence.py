@@ -31,9 +31,9 @@ from slamreplay.bundle.run import Innovations
 from slamreplay.bundle.schema import TABLES
 from slamreplay.bundle.tables import Table
 from slamreplay.bundle.track import PoseTrack
-from slamreplay.consistency.evidence import gathering
 from slamreplay.consistency.belief.credibility import check
 from slamreplay.consistency.context import CheckContext
+from slamreplay.consistency.evidence import gathering
 from slamreplay.consistency.evidence.carried import carried
 from slamreplay.consistency.evidence.gathering import evidence_of
 from slamreplay.consistency.evidence.hindsight_size import HindsightSize
