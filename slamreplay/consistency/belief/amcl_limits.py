@@ -6,6 +6,7 @@ import numpy as np
 
 from slamreplay.consistency.belief.validity import published_rows
 from slamreplay.consistency.context import CheckContext
+from slamreplay.consistency.evidence.published import published_belief
 
 #: What nav2_amcl fills of the 36 entries: xx, xy, yx, yy, and yaw-yaw.
 _FILLED = (0, 1, 6, 7, 35)
@@ -23,11 +24,13 @@ def is_amcl(context: CheckContext) -> bool:
 
 
 def amcl_limits(context: CheckContext) -> str:
-    """A clause on what can be judged of AMCL; empty for any other localizer.
+    """A clause on what can be judged of a particle filter; empty for any other localizer.
 
     It publishes on updates only, and couples no heading: its parts are judged apart, for the joint
     value would be an approximation.
     """
+    if not context.subject and published_belief(context.view) is None and context.updates:
+        return "no covariance was published: these are the mean and covariance of its particles"
     if not is_amcl(context):
         return ""
     text = "AMCL's position and heading are judged apart, on its updates"

@@ -12,6 +12,7 @@ from slamreplay.bundle.odometry import odometry_track
 from slamreplay.bundle.track import PoseTrack
 from slamreplay.bundle.view import BundleView
 from slamreplay.consistency.evidence.charging import charging
+from slamreplay.consistency.evidence.cloud_belief import cloud_belief
 from slamreplay.consistency.evidence.hindsight_size import inflated, measured_hindsight_size
 from slamreplay.consistency.evidence.nees import MAX_GAP_NS, nees
 from slamreplay.consistency.evidence.nees_spatial import spatial_belief, spatial_errors
@@ -29,11 +30,12 @@ def updates_of(
 ) -> PoseTrack | None:
     """The rows of a belief at which it was updated, sorted by time; None without a covariance.
 
-    Of the robot's own localizer those it published with a covariance, else those at which the
-    covariance changed; of an estimator those it marks as `updated`.
+    Of the robot's own localizer those it published with a covariance, else the clouds of its
+    particles, else those at which the covariance changed; of an estimator those it marks as
+    `updated`.
     """
     if not subject:
-        published = published_belief(view)
+        published = published_belief(view) or cloud_belief(view)
         if published is not None:
             return published
     if belief is None:

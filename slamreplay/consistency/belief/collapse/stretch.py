@@ -37,8 +37,9 @@ class Stretch:
 def merged(stretches: Iterable[Stretch]) -> list[Stretch]:
     """One stretch for all that overlap or nearly touch, in time order.
 
-    What is measured against a source speaks first, the more striking before the less; a reason of
-    one kind is told once. Where one of them needs no statistics the whole is a fact.
+    What is measured against a source speaks first, an independent one before a shared one and the
+    more striking before the less; a reason of one kind is told once. Where one of them needs no
+    statistics the whole is a fact.
     """
     found: list[Stretch] = []
     for stretch in sorted(stretches, key=lambda s: (s.start_ns, s.end_ns)):
@@ -50,7 +51,9 @@ def merged(stretches: Iterable[Stretch]) -> list[Stretch]:
 
 
 def _both(one: Stretch, other: Stretch) -> Stretch:
-    first, second = sorted((one, other), key=lambda s: (s.p_value is None, -s.factor))
+    first, second = sorted(
+        (one, other), key=lambda s: (s.p_value is None, not s.independent, -s.factor)
+    )
     tested = [s.p_value for s in (one, other) if s.p_value is not None]
     return replace(
         first,
