@@ -532,6 +532,22 @@ def test_what_an_estimator_is_made_of_says_nothing_of_it():
     assert context_of(tables, innovations=[used]).evidence == ()
 
 
+def test_updates_that_are_left_out_are_held_against_nothing():
+    rng = np.random.default_rng(25)
+    view = bundle([*tagged(rng), odometry_topic(rng, "/visual_odometry", hz=5)]).view()
+    updates = published_belief(view)
+    late = updates.t_ns > 150 * SECOND
+
+    found = evidence_of(updates, (truth("simulation"),), view, left_out=late)
+
+    assert [e.kind for e in found] == ["simulation", "fiducial", "second_odometry"]
+    for e in found:
+        told = np.isfinite(whitened(e.error, e.cov)).all(axis=1)
+        assert e.t_ns[told].max() <= 150 * SECOND
+    nothing = evidence_of(updates, (truth("simulation"),), view, left_out=np.ones_like(late))
+    assert [e.kind for e in nothing] == ["simulation"]
+
+
 def test_references_that_only_judge_change_nothing_of_what_was_sensed():
     rng = np.random.default_rng(20)
     t_s = np.arange(0.0, 300.0, 0.1)

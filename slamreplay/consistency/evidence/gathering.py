@@ -71,9 +71,12 @@ def evidence_of(
     spatial = spatial_belief(view, updates)
     found = [_against(updates, spatial, r, left_out) for r in references if not _is_fixes(r)]
     updates = updates if left_out is None else updates.take(~left_out)
-    found += [*_if_any(satellites(updates, view, motion)), *sighted(updates, view, motion)]
+    if len(updates):
+        found += [*_if_any(satellites(updates, view, motion)), *sighted(updates, view, motion)]
     found = [e for e in found if e.kind not in used]
-    found += [*_if_any(charging(updates, view, motion)), *second_odometry(updates, view, motion)]
+    if len(updates):
+        found += _if_any(charging(updates, view, motion))
+        found += second_odometry(updates, view, motion)
     return tuple(sorted(found, key=lambda e: (e.shared, bool(e.at_most))))
 
 
