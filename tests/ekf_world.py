@@ -29,7 +29,7 @@ def world(seed, noise=Noise(), seconds=60.0, every=10, wrong=0.0):  # noqa: B008
     rng = np.random.default_rng(seed)
     n = int(seconds * HZ)
     t_ns = np.arange(n, dtype=np.int64) * SECOND // HZ
-    turn = (0.1 + 0.4 * np.sin(np.arange(1, n) / HZ * 0.31 + 1.0)) / HZ
+    turn = (0.1 + 0.4 * np.sign(np.sin(np.arange(1, n) / HZ * 0.9 + 1.0))) / HZ  # as robots do
     steps = np.column_stack([np.full(n - 1, 0.3 / HZ), np.zeros(n - 1), turn])
     length = steps[:, 0]
     heading = np.sqrt(

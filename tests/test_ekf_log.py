@@ -145,3 +145,20 @@ def test_lasting_errors_of_sightings_keep_the_filter_modest():
     assert (np.trace(modest.cov[50:], axis1=1, axis2=2)
             > 1.5 * np.trace(plain.cov[50:], axis1=1, axis2=2)).mean() > 0.9  # fmt: skip
     assert np.hypot(*error(modest)[50:, :2].T).max() < 0.15
+
+
+def test_a_robot_at_rest_learns_nothing_from_looking_again():
+    references, transforms = TAGGED.table("references"), TAGGED.table("transforms")
+    moving = transforms["child_frame"] == "base_link"
+    position = np.where(moving[:, None], 0.0, transforms["translation_xyz"])
+    rotation = np.where(moving[:, None], [0.0, 0.0, 0.0, 1.0], transforms["rotation_xyzw"])
+    still = transforms.replace(translation_xyz=position, rotation_xyzw=rotation)
+    early = references.t_ns < START_NS + 10**9
+    sensed = references["kind"] == "fiducial"
+    view = TAGGED.view().with_table(still).with_table(references.take(early | ~sensed))
+    estimate = Ekf().run(view, seed=1)
+
+    seen = references["child_frame_id"][early & sensed]
+    used = estimate.scalars["sightings_accepted"] + estimate.scalars["sightings_rejected"]
+    assert used == len(set(seen))
+    assert estimate.scalars["sightings_without_motion"] == len(seen) - len(set(seen)) > 0

@@ -104,12 +104,10 @@ class EkfTuned:
             view, evidence, filtered(evidence, fit.noise, gates, *scales_of(view))
         )
         fitted = {f"fitted.{name}": float(getattr(fit.noise, name)) for name in fit.fitted}
-        weighed = {
-            "fit.sightings": float(fit.sightings),
-            "fit.log_density_before": fit.before,
-            "fit.log_density_after": fit.after,
-        }
-        return replace(estimate, scalars={**estimate.scalars, **fitted, **weighed})
+        fitted["fit.sightings"] = float(fit.sightings)
+        if fit.before is not None and fit.after is not None:
+            fitted |= {"fit.log_density_before": fit.before, "fit.log_density_after": fit.after}
+        return replace(estimate, scalars={**estimate.scalars, **fitted})
 
 
 def evidence_of(view: BundleView, estimator: Ekf | EkfTuned) -> Evidence:

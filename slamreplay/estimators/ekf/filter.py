@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.special import chdtri
 
 from slamreplay.bundle.track import PoseTrack
+from slamreplay.errors import UsageError
 from slamreplay.estimators.ekf import kernels
 from slamreplay.estimators.ekf.consensus import LEAST_AGREEING, locate, window_of
 from slamreplay.estimators.ekf.motion import Motion, Steps
@@ -121,7 +122,12 @@ def gates_of(probability: float) -> se2.Array:
 
     Args:
         probability: with which a sighting that the model describes is taken in.
+
+    Raises:
+        UsageError: no probability above 0.
     """
+    if not 0.0 < probability <= 1.0:
+        raise UsageError(f"gate_probability is {probability}", where="ekf", hint="0 to 1")
     return np.array([0.0, *(float(chdtri(m, 1.0 - probability)) for m in (1, 2, 3))])
 
 
@@ -146,7 +152,7 @@ def filtered(
     motion = Motion(evidence.odometry, noise) if motion is None else motion
     this = _Pass(evidence, motion, noise, gates, process_scale, measurement_scale)
     events = this.events
-    given = _starts_by_event(evidence.given, events)
+    given = _starts_by_event(evidence, events)
     state: _State | None = None
     event = min(given, default=len(events))
     while event < len(events):
@@ -282,11 +288,11 @@ def _events(
     return events, int((~known[:M]).sum())
 
 
-def _starts_by_event(given: Sequence[Start], events: _Events) -> dict[int, Start]:
-    """Each start at the first event of its time, or the next one whose odometry is known."""
-    found = {}
-    for start in given:
-        later = np.flatnonzero(events.row >= start.row)
-        if len(later):
-            found[int(np.searchsorted(events.t_ns, events.t_ns[later[0]]))] = start
-    return found
+def _starts_by_event(evidence: Evidence, events: _Events) -> dict[int, Start]:
+    """Each start at the first event at or after its time; one after the last event is none."""
+    at = np.searchsorted(events.t_ns, [evidence.row_ns[start.row] for start in evidence.given])
+    return {
+        int(event): start
+        for event, start in zip(at, evidence.given, strict=True)
+        if event < len(events)
+    }

@@ -3,6 +3,9 @@
 The state is x, y, yaw and, for each of the `slots`, the lasting errors of one thing: of its range
 (as a share of it) and of its bearing. A thing that is seen again takes its own slot, a new one a
 free slot or the one not seen for longest.
+
+One module, longer than most: numba keeps a compiled caller though a function that it calls from
+another file has changed.
 """
 
 from __future__ import annotations
@@ -327,7 +330,7 @@ def run(  # type: ignore[no-untyped-def]
     for e in range(first, last):
         if e > first or not starts:
             predict(x, P, steps[e], Q[e])
-            if n > 3:
+            if n > 3 and t_ns[e] > t_ns[e - 1]:
                 fade(x, P, np.exp((t_ns[e - 1] - t_ns[e]) * 1e-9 / lasting_s), lasting)
         s, k = sighting[e], row[e]
         if k >= 0:

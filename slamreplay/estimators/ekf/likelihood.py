@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from slamreplay.estimators.ekf import kernels
 from slamreplay.estimators.ekf.filter import Filtered
+from slamreplay.estimators.ekf.noise import Noise
 from slamreplay.estimators.ekf.observations import Observations
 from slamreplay.geometry import se2
 
@@ -14,7 +15,7 @@ from slamreplay.geometry import se2
 OUTLIERS = 0.01
 
 
-def log_densities(observations: Observations, done: Filtered) -> se2.Array:
+def log_densities(observations: Observations, done: Filtered, noise: Noise) -> se2.Array:
     """(M,) logarithm of the density of each sighting, predicted from all that came before it.
 
     Their sum is the log likelihood of the settings, by the prediction error decomposition: log
@@ -22,7 +23,13 @@ def log_densities(observations: Observations, done: Filtered) -> se2.Array:
     mixed with a share of `OUTLIERS` of an even one, over all ranges up to the longest and over the
     circle. One that was rejected therefore costs what an outlier costs, however far off it is, and
     settings gain nothing by rejecting much; one that found no pose to be held against costs as
-    much.
+    much. The density is that of the range as it was measured: taking all ranges for shorter ones
+    makes none of them more probable.
+
+    Args:
+        observations: the sightings.
+        done: what the filter made of them,
+        noise: with these settings.
     """
     longest = float(observations.polar[:, 0].max(initial=1.0))
     even = -np.log(longest) - (observations.dims - 1) * np.log(2.0 * np.pi)
@@ -32,6 +39,7 @@ def log_densities(observations: Observations, done: Filtered) -> se2.Array:
         white = np.linalg.solve(L, done.residual[rows, :m, None])[:, :, 0]
         spread = np.log(np.diagonal(L, axis1=1, axis2=2)).sum(axis=1)
         fits[rows] = -0.5 * np.sum(white**2, axis=1) - spread - 0.5 * m * np.log(2.0 * np.pi)
+    fits -= np.log(observations.stretch(noise))
     return np.logaddexp(np.log1p(-OUTLIERS) + fits, np.log(OUTLIERS) + even)
 
 

@@ -51,10 +51,16 @@ class Motion:
         self._step[:, 2] = se2.wrap_angle(self._step[:, 2])
         moments = np.cumsum(_moments(path[:-1], self._step), axis=0)
         self._before = np.concatenate([np.zeros_like(moments[:1]), moments])
+        # Of the times that were asked for last: settings change more often than times.
+        self._known: tuple[NDArray[np.int64], NDArray[np.bool_]] | None = None
+        self._gathered: tuple[NDArray[np.int64], se2.Array, se2.Array] | None = None
 
     def known(self, t_ns: NDArray[np.int64], noise: Noise) -> NDArray[np.bool_]:
         """(N,) whether odometry says anything of times (N,) on the sightings' clock."""
-        return self.track.at(t_ns - ns(noise.odometry_delay_s)).has_pose
+        at_ns = t_ns - ns(noise.odometry_delay_s)
+        if self._known is None or not np.array_equal(self._known[0], at_ns):
+            self._known = at_ns, self.track.at(at_ns).has_pose
+        return self._known[1]
 
     def steps(self, t_ns: NDArray[np.int64], noise: Noise) -> Steps:
         """Increments between times and their covariance.
@@ -63,17 +69,24 @@ class Motion:
             t_ns: (E,) sorted times that are `known`.
             noise: how odometry scatters, and its delay.
         """
-        at_ns, t = t_ns - ns(noise.odometry_delay_s), self.track.t_ns
-        k = np.clip(np.searchsorted(t, at_ns, side="right") - 1, 0, max(len(t) - 2, 0))
-        if not len(t_ns) or not len(self._step):
+        at_ns = t_ns - ns(noise.odometry_delay_s)
+        if not len(at_ns) or not len(self._step):
             return Steps(np.zeros((len(t_ns), 3)), np.zeros((len(t_ns), 3, 3)))
-        share = np.clip((at_ns - t[k]) / (t[k + 1] - t[k]), 0.0, 1.0)[:, None]
-        pose = self._path[k] + share * self._step[k]
-        gathered = self._before[k] + _moments(self._path[k], share * self._step[k])
-        gathered = np.diff(gathered, axis=0, prepend=gathered[:1])
+        if self._gathered is None or not np.array_equal(self._gathered[0], at_ns):
+            self._gathered = at_ns, *self._gather(at_ns)
+        _, pose, moments = self._gathered
         before = pose[np.maximum(np.arange(len(pose)) - 1, 0)]
-        Q = _covariance(gathered, _left(pose), noise)
+        Q = _covariance(moments, _left(pose), noise)
         return Steps(se2.between(before, pose), turned(Q, -before[:, 2]))
+
+    def _gather(self, at_ns: NDArray[np.int64]) -> tuple[se2.Array, se2.Array]:
+        """Poses (E, 3) at times of odometry, and the moments (E, 2, 6) of the way to each."""
+        t = self.track.t_ns
+        k = np.clip(np.searchsorted(t, at_ns, side="right") - 1, 0, max(len(t) - 2, 0))
+        share = np.clip((at_ns - t[k]) / (t[k + 1] - t[k]), 0.0, 1.0)[:, None]
+        part = share * self._step[k]
+        until = self._before[k] + _moments(self._path[k], part)
+        return self._path[k] + part, np.diff(until, axis=0, prepend=until[:1])
 
 
 def _moments(start: se2.Array, step: se2.Array) -> se2.Array:

@@ -24,8 +24,8 @@ class Noise:
 
     Errors of a sighting that stay from one look at a thing to the next (the print of a marker, the
     distortion of a lens) are no white noise: fifty looks do not average them out. They are
-    modelled as first-order Gauss-Markov processes and estimated with the pose, by state
-    augmentation (Bar-Shalom, Li, Kirubarajan 2001, section 8.2, autocorrelated noise).
+    modelled as first-order Gauss-Markov processes and estimated with the pose: autocorrelated
+    measurement noise by state augmentation (Bar-Shalom, Li, Kirubarajan 2001, chapter 8).
 
     Attributes:
         position_per_metre: of position along each axis after driving 1 m, m; it grows with the

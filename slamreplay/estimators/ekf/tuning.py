@@ -73,8 +73,10 @@ _CAUTIOUS = replace(
 )
 #: Differences are taken over this share of a spread.
 _STEP = 0.03
-#: The search ends after so many rounds, or `_PATIENCE` of them in a row that gained less than this.
-_ROUNDS, _GAIN, _PATIENCE = 30, 1.0, 5
+#: A search ends after so many rounds, or `_PATIENCE` of them in a row that gained less than this.
+_ROUNDS, _GAIN, _PATIENCE = 30, 1.0, 3
+#: It is begun again where it ended, at most so often, and no more once that gains less than this.
+_RESTARTS, _RESTART_GAIN = 3, 5.0
 #: Delays that can be found: sightings this near to a gap of odometry are not weighed.
 _LONGEST_DELAY_S = 0.6
 #: Odometry is thinned to this period: the filter's noise does not depend on it.
@@ -89,15 +91,16 @@ class Tuned:
         noise: the settings.
         fitted: names of those that were fitted.
         sightings: how many were weighed.
-        before: mean log density of a sighting under the cautious settings at the start.
+        before: mean log density of a sighting under the cautious settings at the start; None
+            where none was weighed.
         after: under the fitted ones.
     """
 
     noise: Noise
     fitted: tuple[str, ...]
     sightings: int
-    before: float
-    after: float
+    before: float | None
+    after: float | None
 
 
 def tuned(evidence: Evidence, gates: se2.Array) -> Tuned:
@@ -112,25 +115,28 @@ def tuned(evidence: Evidence, gates: se2.Array) -> Tuned:
     """
     search = _Search(_from_a_fixed_start(evidence, gates), gates)
     if not search.weighed.any():
-        return Tuned(_CAUTIOUS, (), 0, np.nan, np.nan)
-    first = search.coordinates(_CAUTIOUS)
-    found = minimize(
-        search.cost,
-        first,
-        method="trust-exact",
-        jac=lambda x: search.slope(x)[0],
-        hess=lambda x: search.slope(x)[1],
-        callback=_until_little_is_gained(),
-        options={"maxiter": _ROUNDS, "initial_trust_radius": 1.0, "max_trust_radius": 8.0},
-    )
+        return Tuned(_CAUTIOUS, (), 0, None, None)
+    first = x = search.coordinates(_CAUTIOUS)
+    cost = np.inf
+    for restart in range(_RESTARTS):
+        # The cost has small steps, where a sighting comes to be rejected: differences to the other
+        # side find a way on where the search has run into one.
+        search.step = _STEP if restart % 2 == 0 else -_STEP
+        found = minimize(
+            search.cost,
+            x,
+            method="trust-exact",
+            jac=lambda at: search.slope(at)[0],
+            hess=lambda at: search.slope(at)[1],
+            callback=_until_little_is_gained(),
+            options={"maxiter": _ROUNDS, "initial_trust_radius": 1.0, "max_trust_radius": 8.0},
+        )
+        gained, cost, x = cost - found.fun, found.fun, found.x
+        if restart > 0 and gained < _RESTART_GAIN:
+            break
     n = int(search.weighed.sum())
-    return Tuned(
-        search.noise(found.x),
-        search.names,
-        n,
-        search.log_likelihood(search.pass_of(first)) / n,
-        search.log_likelihood(search.pass_of(found.x)) / n,
-    )
+    before, after = (search.log_likelihood(at, search.pass_of(at)) / n for at in (first, x))
+    return Tuned(search.noise(x), search.names, n, before, after)
 
 
 class _Search:
@@ -140,6 +146,7 @@ class _Search:
         self._evidence, self._gates = evidence, gates
         self.names = _fitted_names(evidence)
         self.weighed = _far_from_gaps(evidence)
+        self.step = _STEP
         self._motions: dict[tuple[float, float, float], Motion] = {}
         self._slope: tuple[bytes, tuple[se2.Array, se2.Array]] | None = None
 
@@ -172,24 +179,26 @@ class _Search:
             self._motions[key] = Motion(self._evidence.odometry, noise)
         return filtered(self._evidence, noise, self._gates, motion=self._motions[key])
 
-    def log_likelihood(self, done: Filtered) -> float:
-        """Of the sightings that are weighed."""
-        return float(log_densities(self._evidence.observations, done)[self.weighed].sum())
+    def log_likelihood(self, x: se2.Array, done: Filtered) -> float:
+        """Of the sightings that are weighed, in a pass at coordinates (P,)."""
+        densities = log_densities(self._evidence.observations, done, self.noise(x))
+        return float(densities[self.weighed].sum())
 
     def cost(self, x: se2.Array) -> float:
         """What is made small: minus the logarithm of likelihood and prior."""
-        return float(0.5 * x @ x) - self.log_likelihood(self.pass_of(x))
+        return float(0.5 * x @ x) - self.log_likelihood(x, self.pass_of(x))
 
     def slope(self, x: se2.Array) -> tuple[se2.Array, se2.Array]:
         """(P,) derivative of the cost, and (P, P) its expected second derivative."""
-        if self._slope is None or self._slope[0] != x.tobytes():
+        key = x.tobytes() + np.float64(self.step).tobytes()
+        if self._slope is None or self._slope[0] != key:
             here = self.pass_of(x)
-            others = [self.pass_of(x + _STEP * e) for e in np.eye(len(x))]
-            value = self.log_likelihood(here)
-            gain = np.array([self.log_likelihood(other) - value for other in others]) / _STEP
-            vectors = score_vectors(self._evidence.observations, here, others, _STEP)
-            slope = x - gain, np.eye(len(x)) + vectors @ vectors.T
-            self._slope = x.tobytes(), slope
+            places = x + self.step * np.eye(len(x))
+            others = [self.pass_of(place) for place in places]
+            values = [self.log_likelihood(at, o) for at, o in zip(places, others, strict=True)]
+            gain = (np.array(values) - self.log_likelihood(x, here)) / self.step
+            vectors = score_vectors(self._evidence.observations, here, others, self.step)
+            self._slope = key, (x - gain, np.eye(len(x)) + vectors @ vectors.T)
         return self._slope[1]
 
 
