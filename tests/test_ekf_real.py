@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from slamreplay.consistency.nees import nees
+from slamreplay.consistency.evidence.nees import nees
 from slamreplay.estimators.ekf.estimator import Ekf, EkfTuned
 from slamreplay.ingest.options import IngestOptions
 from slamreplay.ingest.pipeline import ingest

@@ -8,7 +8,7 @@ from ekf_world import world
 from scipy.optimize import approx_fprime
 
 from slamreplay.bundle.track import PoseTrack
-from slamreplay.consistency.nees import nees
+from slamreplay.consistency.evidence.nees import nees
 from slamreplay.estimators.ekf import kernels
 from slamreplay.estimators.ekf.estimator import MEASUREMENT_NOISE, PROCESS_NOISE, Ekf, EkfTuned
 from slamreplay.estimators.ekf.filter import filtered, gates_of
