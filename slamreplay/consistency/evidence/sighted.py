@@ -20,8 +20,9 @@ from slamreplay.geometry.transforms import clean_frame
 WITHIN_S = 0.5
 #: Sightings under one name that a belief puts farther apart than this are of two things.
 ONE_THING_M = 2.0
-#: A belief of which this share of updates bears the very stamps of sightings may be made of them.
-_SAME_STAMPS = 0.5
+#: A belief is made of sightings if this share of its updates bears their very stamps, and puts what
+#: was seen then so exactly where it always puts it: two measurements never agree like that.
+_SAME_STAMPS, _EXACT_M, _LEAST = 0.5, 2e-3, 3
 #: So many names are spelt out.
 _NAMES = 3
 
@@ -45,22 +46,32 @@ def sighted(updates: PoseTrack, view: BundleView, motion: PoseTrack | None) -> t
         rows = np.flatnonzero(seen.kind == kind)
         if not len(rows):
             continue
-        if _may_be_made_of(updates, seen.t_ns[rows]):
-            why = "its updates bear their very stamps, as those of a belief made of them would"
-            found.append(Evidence.refused(f"sightings of {kind}s", kind, why))
-            continue
         at = carried(
             updates, motion, seen.t_ns[rows], seen.name[rows], seen.xyyaw[rows], seen.cov[rows],
             WITHIN_S,
         )  # fmt: skip
         at = Carried(at.update, rows[at.sensed], at.places, at.cov)
+        if _is_made_of(updates, seen, at):
+            why = "its updates bear their very stamps and agree with them to the millimetre"
+            found.append(Evidence.refused(f"sightings of {kind}s", kind, why))
+            continue
         found += _surveyed(kind, updates.t_ns, seen, at) if in_map else []
         found += _again(kind, updates.t_ns, seen, at)
     return tuple(found)
 
 
-def _may_be_made_of(updates: PoseTrack, t_ns: NDArray[np.int64]) -> bool:
-    return bool(np.isin(updates.t_ns, t_ns).mean() >= _SAME_STAMPS)
+def _is_made_of(updates: PoseTrack, seen: Sightings, at: Carried) -> bool:
+    """Whether a belief was computed from the sightings that it would be held against."""
+    same = at.take(updates.t_ns[at.update] == seen.t_ns[at.sensed])
+    apart = np.full(len(same.update), np.inf)
+    for name in sorted(set(seen.name[same.sensed])):
+        rows = np.flatnonzero(seen.name[same.sensed] == name)
+        if len(rows) >= _LEAST:
+            xy = same.places[rows, :2]
+            apart[rows] = np.hypot(*(xy - np.median(xy, axis=0)).T)
+    nearest = np.full(len(updates), np.inf)  # of several things it may be made of one alone
+    np.minimum.at(nearest, same.update, apart)
+    return bool((nearest <= _EXACT_M).mean() >= _SAME_STAMPS)
 
 
 def _surveyed(kind: str, t_ns: NDArray[np.int64], seen: Sightings, at: Carried) -> list[Evidence]:
