@@ -275,3 +275,36 @@ def test_where_the_sensor_sits_is_not_known_better_for_looking_longer():
     np.testing.assert_array_equal(mounted.xyyaw, exact.xyyaw)
     extra = np.broadcast_to(np.diag([9e-4, 9e-4, 4e-4]), exact.cov.shape)
     np.testing.assert_allclose(mounted.cov - exact.cov, extra, atol=1e-12)
+
+
+def test_no_pose_is_taken_where_another_one_explains_as_many_sightings():
+    """Three things as seen from X, and from Y the third of them with two others."""
+    places = np.array([[3.0, 1.0], [3.0, -2.0], [4.0, 0.5], [1.0, 3.0], [-1.0, 2.0]])
+    X = np.array([0.3, -0.2, 0.4])
+    turn = np.array([*places[2], 1.9])  # about the third thing, which looks the same from both
+    Y = se2.compose(turn, se2.compose([*-places[2], 0.0], X))
+    poses = np.array([X, X, X, Y, Y])
+    seen = se2.between(poses, np.column_stack([places, np.zeros(5)]))[:, :2]
+    polar = np.column_stack([np.hypot(*seen.T), np.arctan2(seen[:, 1], seen[:, 0]), np.zeros(5)])
+    at = np.column_stack([places, np.full(5, np.nan)])
+    R, still = np.tile(np.diag([4e-4, 1e-4, 1.0]), (5, 1, 1)), np.zeros((5, 3))
+    Q = np.zeros((5, 3, 3))
+
+    def found(rows):
+        dims = np.full(len(rows), 2)
+        return locate(window_of(polar[rows], dims, R[rows], at[rows], rows, still[rows], Q[rows]))
+
+    np.testing.assert_allclose(found(np.array([0, 1, 2]))[0], X, atol=1e-6)
+    np.testing.assert_allclose(found(np.array([2, 3, 4]))[0], Y, atol=1e-6)
+    assert found(np.arange(5)) is None
+
+
+def test_a_start_from_errors_that_last_is_less_certain():
+    evidence, _ = world(0, seconds=20.0)
+    evidence = replace(evidence, given=[Start(0, None, START_COV)])
+    ranges, bearings = (replace(EXACT, **{k: 0.1}) for k in ("lasting_range_per_m",
+                                                             "lasting_bearing_rad"))  # fmt: skip
+    white, *lasting = (filtered(evidence, n, GATES) for n in (EXACT, ranges, bearings))
+    row = int(np.argmax(np.isfinite(white.xyyaw[:, 0])))
+    for out in lasting:
+        assert np.trace(out.cov[row]) > 1.3 * np.trace(white.cov[row])
