@@ -10,6 +10,8 @@ from slamreplay.estimators.start import Start
 from slamreplay.geometry import se2
 
 HZ, SECOND = 20, 10**9
+#: The sensor sits exactly in the base.
+EXACT = Noise(mount_m=0.0, mount_rad=0.0)
 PLACES = np.array(
     [[4.0, 1.0, 0.0], [-3.0, 4.0, 0.0], [0.5, -5.0, 0.0], [6.0, 6.0, 0.0], [-5.0, -3.0, 0.0],
      [2.0, 3.5, 0.0]]
@@ -17,7 +19,7 @@ PLACES = np.array(
 START_COV = np.array([[0.02, 0.005, 0.001], [0.005, 0.01, 0.002], [0.001, 0.002, 0.01]])
 
 
-def world(seed, noise=Noise(), seconds=60.0, every=10, wrong=0.0):  # noqa: B008
+def world(seed, noise=EXACT, seconds=60.0, every=10, wrong=0.0):
     """Evidence, and the true poses (N, 3) at its rows, which are the odometry's.
 
     Args:

@@ -1,8 +1,10 @@
 """The extended Kalman filter: its steps against an oracle, its consistency against chance."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from ekf_world import PLACES, START_COV, world
+from ekf_world import EXACT, PLACES, START_COV, world
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import chi2
@@ -21,7 +23,7 @@ from slamreplay.geometry import se2
 
 GATES = gates_of(0.999)
 WIDE = gates_of(1.0 - 1e-12)
-LASTING = Noise(lasting_range_per_m=0.06, lasting_bearing_rad=0.02)
+LASTING = replace(EXACT, lasting_range_per_m=0.06, lasting_bearing_rad=0.02)
 
 
 def covariance(rng, n):
@@ -139,7 +141,7 @@ def test_other_sizes_of_wheels_bend_the_path():
     np.testing.assert_allclose(bent[:, 2], 0.9 * told[:, 2] + 0.22 * length, atol=1e-6)
 
 
-@pytest.mark.parametrize("noise", [Noise(), LASTING], ids=["white", "lasting"])
+@pytest.mark.parametrize("noise", [EXACT, LASTING], ids=["white", "lasting"])
 def test_consistent_noise_gives_nees_and_nis_within_their_intervals(noise):
     runs = 40
     last, nis, reached = [], [], []
@@ -163,7 +165,7 @@ def test_one_long_log_is_consistent_and_half_the_noise_told_is_four_times_too_su
     reference = PoseTrack.without_covariance("map", "base_link", evidence.row_ns, truth)
 
     def summary(process, measurement):
-        out = filtered(evidence, Noise(), WIDE, process, measurement)
+        out = filtered(evidence, EXACT, WIDE, process, measurement)
         track = PoseTrack("map", "base_link", evidence.row_ns, out.xyyaw, out.cov)
         return nees(track, reference).summary("joint"), squares(out).mean()
 
@@ -178,7 +180,7 @@ def test_one_long_log_is_consistent_and_half_the_noise_told_is_four_times_too_su
 
 def test_errors_that_last_make_a_filter_that_thinks_them_white_too_sure():
     errors = []
-    told = Noise(range_per_m=0.07, bearing_rad=0.03)  # as wide, but white
+    told = replace(EXACT, range_per_m=0.07, bearing_rad=0.03)  # as wide, but white
     for seed in range(20):
         evidence, truth = world(seed, LASTING)
         out = filtered(evidence, told, GATES)
@@ -190,7 +192,7 @@ def test_errors_that_last_make_a_filter_that_thinks_them_white_too_sure():
 
 def test_wrong_names_are_rejected_and_right_ones_are_not():
     evidence, truth = world(1, wrong=0.1)
-    out = filtered(evidence, Noise(), GATES)
+    out = filtered(evidence, EXACT, GATES)
     plain = world(1)[0].observations
 
     wrong = evidence.observations.thing != plain.thing
@@ -204,7 +206,7 @@ def test_it_starts_from_sightings_alone_though_some_names_are_wrong():
     for seed in range(20):
         evidence, truth = world(seed, wrong=0.15, seconds=20.0)
         evidence.given[0] = Start(0, None, START_COV)
-        out = filtered(evidence, Noise(), GATES)
+        out = filtered(evidence, EXACT, GATES)
         first = int(np.argmax(np.isfinite(out.xyyaw[:, 0])))
         e = out.xyyaw[first] - truth[first]
         e[2] = se2.wrap_angle(e[2])
@@ -263,3 +265,46 @@ def test_noise_that_makes_no_sense_is_refused():
         with pytest.raises(UsageError, match="ekf"):
             Noise(**values)
     assert Noise(bearing_offset_rad=-0.1).bearing_offset_rad == -0.1
+
+
+def test_where_the_sensor_sits_is_not_known_better_for_looking_longer():
+    evidence, _ = world(0)
+    exact = filtered(evidence, EXACT, GATES)
+    mounted = filtered(evidence, replace(EXACT, mount_m=0.03, mount_rad=0.02), GATES)
+
+    np.testing.assert_array_equal(mounted.xyyaw, exact.xyyaw)
+    extra = np.broadcast_to(np.diag([9e-4, 9e-4, 4e-4]), exact.cov.shape)
+    np.testing.assert_allclose(mounted.cov - exact.cov, extra, atol=1e-12)
+
+
+def test_no_pose_is_taken_where_another_one_explains_as_many_sightings():
+    """Three things as seen from X, and from Y the third of them with two others."""
+    places = np.array([[3.0, 1.0], [3.0, -2.0], [4.0, 0.5], [1.0, 3.0], [-1.0, 2.0]])
+    X = np.array([0.3, -0.2, 0.4])
+    turn = np.array([*places[2], 1.9])  # about the third thing, which looks the same from both
+    Y = se2.compose(turn, se2.compose([*-places[2], 0.0], X))
+    poses = np.array([X, X, X, Y, Y])
+    seen = se2.between(poses, np.column_stack([places, np.zeros(5)]))[:, :2]
+    polar = np.column_stack([np.hypot(*seen.T), np.arctan2(seen[:, 1], seen[:, 0]), np.zeros(5)])
+    at = np.column_stack([places, np.full(5, np.nan)])
+    R, still = np.tile(np.diag([4e-4, 1e-4, 1.0]), (5, 1, 1)), np.zeros((5, 3))
+    Q = np.zeros((5, 3, 3))
+
+    def found(rows):
+        dims = np.full(len(rows), 2)
+        return locate(window_of(polar[rows], dims, R[rows], at[rows], rows, still[rows], Q[rows]))
+
+    np.testing.assert_allclose(found(np.array([0, 1, 2]))[0], X, atol=1e-6)
+    np.testing.assert_allclose(found(np.array([2, 3, 4]))[0], Y, atol=1e-6)
+    assert found(np.arange(5)) is None
+
+
+def test_a_start_from_errors_that_last_is_less_certain():
+    evidence, _ = world(0, seconds=20.0)
+    evidence = replace(evidence, given=[Start(0, None, START_COV)])
+    ranges, bearings = (replace(EXACT, **{k: 0.1}) for k in ("lasting_range_per_m",
+                                                             "lasting_bearing_rad"))  # fmt: skip
+    white, *lasting = (filtered(evidence, n, GATES) for n in (EXACT, ranges, bearings))
+    row = int(np.argmax(np.isfinite(white.xyyaw[:, 0])))
+    for out in lasting:
+        assert np.trace(out.cov[row]) > 1.3 * np.trace(white.cov[row])

@@ -146,7 +146,8 @@ def filtered(
         noise: the settings.
         gates: (4,) see `gates_of`.
         process_scale: ratio by which the covariance of motion is multiplied.
-        measurement_scale: ratio for that of sightings, their lasting errors included.
+        measurement_scale: ratio for that of sightings, their lasting errors and the sensor's mount
+            included.
         motion: of this odometry without these constant errors, where it is at hand.
     """
     motion = Motion(evidence.odometry, noise) if motion is None else motion
@@ -192,6 +193,8 @@ class _Pass:
         self.xyyaw, self.cov = np.full((N, 3), np.nan), np.full((N, 3, 3), np.nan)
         self.updated, self.status = np.full(N, np.nan), np.zeros(M, dtype=np.int64)
         self.residual, self.S = np.full((M, 3), np.nan), np.full((M, 3, 3), np.nan)
+        mount = np.diag([noise.mount_m, noise.mount_m, noise.mount_rad]) ** 2
+        self.mount = measurement_scale * mount
         self.retry_ns, self.located, self.recoveries = _NEVER, 0, 0
 
     def started(self, start: Start) -> _State | None:
@@ -233,8 +236,8 @@ class _Pass:
     def out(self) -> Filtered:
         """What has been filled in."""
         return Filtered(
-            self.xyyaw, self.cov, self.updated, self.residual, self.S, self.status, self.located,
-            self.recoveries, self.silent,
+            self.xyyaw, self.cov + self.mount, self.updated, self.residual, self.S, self.status,
+            self.located, self.recoveries, self.silent,
         )  # fmt: skip
 
     def _located(self, event: int) -> _State | None:

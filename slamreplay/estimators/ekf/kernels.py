@@ -204,7 +204,7 @@ def less_outer(P, U, V, m):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def correct(x, P, H, R, m, HP, L, residual):  # type: ignore[no-untyped-def]
+def correct(x, P, H, R, m, HP, L, residual):  # type: ignore[no-untyped-def]  # noqa: C901
     """Take a measurement in, in place: Joseph's form (I - K H) P (I - K H)' + K R K'.
 
     With A = P - K H P this is A - (A H' - K R) K', from left to right; A H' = K R only for an
@@ -221,10 +221,12 @@ def correct(x, P, H, R, m, HP, L, residual):  # type: ignore[no-untyped-def]
     for r in range(m):
         for i in range(n):
             rest[r, i] = 0.0
-            for j in range(n):
-                rest[r, i] += P[i, j] * H[r, j]
             for c in range(m):
                 rest[r, i] -= K[c, i] * R[c, r]
+        for j in range(n):
+            if H[r, j] != 0.0:
+                for i in range(n):
+                    rest[r, i] += P[i, j] * H[r, j]
     less_outer(P, rest, K, m)
     for i in range(n):
         for j in range(i):
