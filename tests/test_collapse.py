@@ -27,6 +27,7 @@ from slamreplay.consistency.belief.amcl_limits import is_amcl
 from slamreplay.consistency.belief.collapse.check import check
 from slamreplay.consistency.belief.collapse.episodes import scan
 from slamreplay.consistency.belief.collapse.floor import sensor_floor
+from slamreplay.consistency.belief.collapse.size import mean_sigma, position_sigma
 from slamreplay.consistency.belief.collapse.stretch import Stretch, merged
 from slamreplay.consistency.context import CheckContext
 from slamreplay.consistency.evidence.references import references_of
@@ -353,6 +354,14 @@ def test_facts_and_errors_of_one_collapse_are_one_finding():
     assert finding.value > 50.0
     assert "while the error against motion capture" in finding.message
     assert "below the" in finding.message
+
+
+def test_a_covariance_that_was_not_given_has_no_size():
+    cov = np.stack([np.diag([0.04, 0.09, 0.01]), np.full((3, 3), np.nan), -np.eye(3)])
+
+    np.testing.assert_allclose(position_sigma(cov), [np.sqrt(0.06), np.nan, 1.0])
+    np.testing.assert_allclose(mean_sigma(cov[:1]), [(0.04 * 0.09 * 0.01) ** (1 / 6)])
+    assert np.isnan(mean_sigma(cov)[1])
 
 
 def test_stretches_that_nearly_touch_are_one():

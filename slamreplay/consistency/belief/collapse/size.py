@@ -8,8 +8,11 @@ from slamreplay.geometry.se2 import Array
 
 
 def position_sigma(cov: Array) -> Array:
-    """(N,) m: fourth root of det of the position block of (N, 3, 3); 0 where it is none."""
-    return np.asarray(_positive(np.linalg.det(cov[:, :2, :2])) ** 0.25)
+    """(N,) m: fourth root of det of the position block of (N, 3, 3).
+
+    0 where it is none, NaN where it is not given.
+    """
+    return np.asarray(_positive(_det(cov[:, :2, :2])) ** 0.25)
 
 
 def heading_sigma(cov: Array) -> Array:
@@ -24,7 +27,12 @@ def mean_sigma(cov: Array) -> Array:
     """
     if not np.isfinite(cov[:, 2, 2]).all():
         return position_sigma(cov)
-    return np.asarray(_positive(np.linalg.det(cov)) ** (1.0 / 6.0))
+    return np.asarray(_positive(_det(cov)) ** (1.0 / 6.0))
+
+
+def _det(cov: Array) -> Array:
+    with np.errstate(invalid="ignore"):  # of what was not given
+        return np.asarray(np.linalg.det(cov))
 
 
 def _positive(value: Array) -> Array:
