@@ -349,6 +349,20 @@ def test_few_effective_samples_accuse_nobody():
     assert "too few" in finding.message
 
 
+def test_of_what_cannot_be_decided_the_oddest_is_told():
+    for axis, name in ((2, "heading"), (0, "position")):
+        split = P.copy()
+        split[:2, 2] = split[2, :2] = 0.0
+        split[axis, axis] /= 100.0  # sigma of this part is ten times too small
+        if axis == 0:
+            split[0, 1] = split[1, 0] = 0.0
+        belief, truth = tracks(n=15, cov=split)
+        (finding,) = run("nees", bundle([posed("poses", belief, "/pose")]), truth)
+
+        assert finding.id == "SR-CON-003"
+        assert f"sigma of the {name} is too small" in finding.message
+
+
 def test_without_coupling_position_and_heading_are_judged_apart():
     split = P.copy()
     split[:2, 2] = split[2, :2] = 0.0

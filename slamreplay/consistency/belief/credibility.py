@@ -128,10 +128,15 @@ def _unproven(enough: list[_Told], limits: str) -> Finding:
 
 
 def _too_few(summaries: list[_Told], limits: str) -> Finding:
-    most = max(summaries, key=lambda told: told[2].test.n_eff)
+    most = min(summaries, key=lambda told: _oddness(told[2]))
     evidence, _, summary = most
     text = f"too few independent updates ({summary.test.n_eff:.0f}) to judge the covariance against"
     return _undecided(f"{text} {evidence.source}: {summary.sentence}{limits}", most)
+
+
+def _oddness(summary: NeesSummary) -> float:
+    """The p-value, 2 where there is none: of what cannot be decided the oddest is worth a look."""
+    return 2.0 if summary.test.p_value is None else summary.test.p_value
 
 
 def _unasked(lacks: str) -> Finding:
