@@ -1,5 +1,7 @@
 """What a belief is held against: consistent ones have whitened errors of variance 1."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from evidence_logs import (
@@ -27,11 +29,15 @@ from evidence_logs import (
 from scipy.spatial.transform import Rotation
 
 from slamreplay.bundle.batteries import charging_stretches
+from slamreplay.bundle.findings import Finding
 from slamreplay.bundle.odometry import odometry_track
 from slamreplay.bundle.run import Innovations
 from slamreplay.bundle.schema import TABLES
 from slamreplay.bundle.tables import Table
 from slamreplay.bundle.track import PoseTrack
+from slamreplay.consistency.answers import Suspicion
+from slamreplay.consistency.belief import credible, shape
+from slamreplay.consistency.belief.collapse.outgrown import outgrown
 from slamreplay.consistency.belief.credibility import check
 from slamreplay.consistency.context import CheckContext
 from slamreplay.consistency.evidence import gathering
@@ -338,6 +344,21 @@ def test_charging_while_it_drives_or_over_again_in_the_dock_is_no_docking():
     assert len(same.error) == 9
 
 
+def test_a_moment_of_current_or_a_robot_that_never_left_is_no_docking():
+    start = np.arange(10) * CYCLE_S
+    brief = np.sort(np.concatenate([[0.0], start + DRIVE_S + 3.0, start + DRIVE_S + 6.0]))
+    assert dockings(brief, ["not charging", *["charging", "not charging"] * 10]) == ()
+
+    rng = np.random.default_rng(26)
+    at_rest = lambda t_s: np.tile([1.4, -0.6, 0.9], (len(t_s), 1))  # noqa: E731
+    on_off = battery(np.arange(0.0, 280.0, 15.0), ["not charging", *["charging", "full"] * 9])
+    switched = on_off.replace(message=np.where(
+        on_off["message"] == "full", "not charging", on_off["message"].astype(str)
+    ).astype(object))  # fmt: skip
+    tables = [belief(rng, at=at_rest), odometry(at_rest, hz=5), switched]
+    assert found_in(tables, 300) == ()
+
+
 def test_a_belief_that_jumps_between_dockings_is_found_and_another_dock_is_another():
     def tables(jump, seed=11):
         rng = np.random.default_rng(seed)
@@ -518,6 +539,41 @@ def test_hindsights_covariance_is_made_as_large_as_it_ought_to_be(monkeypatch):
     assert "was inflated by 1.5 in position and by 2 in heading, its calibrated size" in large.note
     assert small.shared
     assert small.at_most
+
+
+def test_shared_evidence_must_be_gross():
+    tables = [belief(np.random.default_rng(27), told=0.7), odometry(hz=5)]
+
+    (against,) = context_of(tables, [truth("hindsight")]).evidence
+    answers = check(context_of(tables, [truth("hindsight")]))
+
+    assert mean_test(whitened(against.error, against.cov)).p_small < 1e-3
+    assert [a.p_value for a in answers if isinstance(a, Suspicion)] == [1.0]
+    assert any("no gross over-confidence" in a.message for a in answers if isinstance(a, Finding))
+
+
+def test_a_bound_has_no_shape_that_could_be_off():
+    rng = np.random.default_rng(28)
+    bounded = context_of(tagged(rng, told=0.3))
+    for ask_shape in (shape.check, credible.check):
+        assert ask_shape(bounded) == ()
+        assert ask_shape(replace(bounded, references=(truth("simulation"),)))
+
+
+def test_a_bound_does_not_silence_hindsight_where_a_belief_left_what_it_allows():
+    rng = np.random.default_rng(29)
+    tables = unknown(rng)
+    away = (tables[0].t_ns > 100 * SECOND) & (tables[0].t_ns < 140 * SECOND)
+    shifted = tables[0]["position_xyz"] + away[:, None] * np.array([1.4, -1.1, 0.0])
+    unseen = (tables[2].t_ns < 90 * SECOND) | (tables[2].t_ns > 150 * SECOND)
+    tables = [tables[0].replace(position_xyz=shifted), tables[1], tables[2].take(unseen)]
+    context = context_of(tables, [truth("hindsight")])
+
+    (stretch,), _ = outgrown(context.updates, context.evidence)
+
+    assert not stretch.independent
+    assert abs(stretch.start_ns - 100 * SECOND) < 5 * SECOND
+    assert abs(stretch.end_ns - 140 * SECOND) < 5 * SECOND
 
 
 def test_a_bound_never_calls_a_belief_timid_nor_right():
