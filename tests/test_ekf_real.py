@@ -40,12 +40,14 @@ def test_a_robot_among_landmarks_is_followed_without_any_start(found):
     assert estimates["ekf"].track.has_pose.mean() > 0.98
 
 
-def test_tuning_makes_it_better_and_less_too_sure(found):
-    numbers, _ = found
-    (error, sure), (tuned_error, tuned_sure) = numbers["ekf"], numbers["ekf_tuned"]
+def test_tuning_makes_it_better_and_innovations_news(found):
+    numbers, estimates = found
 
-    assert tuned_error < 0.9 * error
-    assert tuned_sure < 0.6 * sure
+    assert numbers["ekf_tuned"][0] < 0.9 * numbers["ekf"][0]
+    for name, low, high in (("ekf", 0.3, 0.7), ("ekf_tuned", -0.15, 0.15)):
+        (seen,) = estimates[name].innovations
+        kept = seen.residual[seen.accepted, 0] / np.sqrt(seen.S[seen.accepted, 0, 0])
+        assert low < np.mean(kept[1:] * kept[:-1]) / np.mean(kept**2) < high
 
 
 def test_ranges_that_are_depths_and_commands_that_lead_are_found(found):

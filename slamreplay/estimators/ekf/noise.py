@@ -43,7 +43,8 @@ class Noise:
         lasting_s: time constant with which lasting errors change, s.
         mount_m: of where the sensor sits on the base, along each axis, m,
         mount_rad: and of how it is turned, rad. The filter follows the sensor and no sighting
-            tells these: they are added to the covariance that it gives out, never fitted.
+            tells these: they are added to the covariance that it gives out, never fitted. 0 by
+            default: whoever measured the mount knows them.
         range_ratio: measured range divided by the true one.
         range_offset_m: metres added to every range.
         range_falloff: share that a range lacks 1 rad beside the axis of the sensor, growing with
@@ -70,8 +71,8 @@ class Noise:
     lasting_range_per_m: float = 0.0
     lasting_bearing_rad: float = 0.0
     lasting_s: float = 5.0
-    mount_m: float = 0.02
-    mount_rad: float = 0.01
+    mount_m: float = 0.0
+    mount_rad: float = 0.0
     range_ratio: float = 1.0
     range_offset_m: float = 0.0
     range_falloff: float = 0.0
