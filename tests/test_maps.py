@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from PIL import Image
 
@@ -145,8 +145,17 @@ def marched(grid, pose, bearing, max_range):
     return np.inf
 
 
+def touches(grid, pose, bearing, r):
+    """Whether a wall is within a fiftieth of a cell of the ray's point at range r."""
+    xy = pose[:2] + r * np.array([np.cos(pose[2] + bearing), np.sin(pose[2] + bearing)])
+    near = grid.resolution_m / 50 * np.array([(dx, dy) for dx in (-1, 0, 1) for dy in (-1, 0, 1)])
+    cells = [grid.cell_of(xy + step) for step in near]
+    return any(grid.inside(cell) and grid.occupied[tuple(cell)] for cell in cells)
+
+
 @settings(max_examples=25, deadline=None)
 @given(st.floats(-3.1, 3.1))
+@example(0.8853942734469982)  # a corner that the march steps over
 def test_rays_agree_with_a_march(bearing):
     grid = room()
     pose = np.append(grid.centre_of([12, 12]), 0.3)
@@ -155,9 +164,10 @@ def test_rays_agree_with_a_march(bearing):
 
     expected = marched(grid, pose, bearing, 20.0)
     if np.isinf(expected):
-        assert got > 10 or np.isinf(got)
-    else:  # a corner can be grazed between two steps, never passed by more than a cell's diagonal
-        assert abs(got - expected) < 0.36
+        assert got > 10 or touches(grid, pose, bearing, got)
+    else:  # a corner can be grazed between two steps
+        grazed = got < expected and touches(grid, pose, bearing, got)
+        assert abs(got - expected) < 0.36 or grazed
 
 
 def test_ray_along_an_axis_is_exact():
