@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -37,31 +38,55 @@ class MeanTest:
 
     Attributes:
         dof: of each row: what the mean of a consistent belief would be without a gate.
-        n: valid rows.
-        n_eff: independent ones among them.
+        samples: valid rows, and what they are worth.
         mean: of the squared lengths; None without a valid row.
-        low: lower end of the interval that a consistent belief's mean misses with `NOMINAL`.
-        high: upper end.
         p_value: two-sided.
         p_small: one-sided, that the claimed covariance is too small.
-        sufficient: whether there may be `N_EFF_MIN` effective samples.
         gate: what was cut off before.
     """
 
     dof: int
-    n: int
-    n_eff: float
+    samples: ErrorSamples
     mean: float | None
-    low: float | None
-    high: float | None
     p_value: float | None
     p_small: float | None
-    sufficient: bool
     gate: Truncation | None = None
 
     @property
+    def n(self) -> int:
+        """Valid rows."""
+        return self.samples.n
+
+    @property
+    def n_eff(self) -> float:
+        """Independent ones among them."""
+        return self.samples.n_eff
+
+    @property
+    def sufficient(self) -> bool:
+        """Whether there may be `N_EFF_MIN` effective samples."""
+        return self.samples.n_eff_max >= N_EFF_MIN
+
+    @property
+    def low(self) -> float | None:
+        """Lower end of the interval that a consistent belief's mean misses with `NOMINAL`."""
+        return None if self.mean is None else self._ends[0]
+
+    @property
+    def high(self) -> float | None:
+        """Upper end of it."""
+        return None if self.mean is None else self._ends[1]
+
+    @cached_property
+    def _ends(self) -> tuple[float, float]:
+        """Searched for when asked: most tests are asked for their p-value alone."""
+        shape, unit = _matched(self.dof, self.gate)
+        low, high = _interval(shape, self.samples)
+        return unit * low, unit * high
+
+    @property
     def ratio(self) -> float | None:
-        """K = sqrt(mean / dof): sigma is too small by this factor, too large below 1."""
+        """The factor sqrt(mean / dof): sigma is too small by this factor, too large below 1."""
         if self.mean is None:
             return None
         return (self.gate or Truncation(self.dof)).scale(self.mean, self.dof)
@@ -85,23 +110,11 @@ def mean_test(white: ArrayLike, gate: Truncation | None = None) -> MeanTest:
     w = w[np.isfinite(w).all(axis=1)]
     n, dof = w.shape
     if not n:
-        return MeanTest(dof, 0, 0.0, None, None, None, None, None, sufficient=False, gate=gate)
+        return MeanTest(dof, ErrorSamples(0, 0.0, 0.0), None, None, None, gate)
     mean, samples = float(np.sum(w**2) / n), error_samples(w)
     shape, unit = _matched(dof, gate)
     above, below = _tails(shape, samples, mean / unit)
-    low, high = (unit * end for end in _interval(shape, samples))
-    return MeanTest(
-        dof,
-        n,
-        samples.n_eff,
-        mean,
-        low,
-        high,
-        min(1.0, 2.0 * min(above, below)),
-        above,
-        sufficient=samples.n_eff_max >= N_EFF_MIN,
-        gate=gate,
-    )
+    return MeanTest(dof, samples, mean, min(1.0, 2.0 * min(above, below)), above, gate)
 
 
 def _matched(dof: int, gate: Truncation | None) -> tuple[float, float]:
