@@ -1,6 +1,8 @@
 """What `slamreplay inspect` says: keys that stay, audits that are true, on any log."""
 
 import json
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -171,3 +173,15 @@ def test_finding_ids_of_audits_are_explained(program):
 
     assert result.exit_code == 0
     assert "transform" in result.stdout
+
+
+def test_inspecting_loads_no_statistics():
+    # Its checks ask no belief: who only wants to see what a log holds does not wait for scipy.
+    code = (
+        "import sys, slamreplay.consistency.audits.inspection;"
+        "heavy = {'scipy', 'numba', 'gtsam', 'matplotlib', 'pandas'};"
+        "sys.exit(', '.join(sorted(heavy & set(sys.modules))) or 0)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+
+    assert done.returncode == 0, done.stderr

@@ -20,7 +20,6 @@ from slamreplay.consistency.evidence.belonging import (
     belonging_of_robot,
     belonging_of_run,
 )
-from slamreplay.consistency.evidence.gathering import evidence_of, updates_of
 from slamreplay.consistency.evidence.source import Evidence, Reference
 from slamreplay.geometry.se2 import Array
 
@@ -66,6 +65,8 @@ class CheckContext:
 
         A covariance that was merely held between them would count the same evidence again.
         """
+        from slamreplay.consistency.evidence.gathering import updates_of  # loads scipy
+
         return updates_of(self.belief, self.view, self.subject, self.diagnostics)
 
     @cached_property
@@ -73,6 +74,8 @@ class CheckContext:
         """The updates' errors against each source that can tell, the best first."""
         if self.updates is None:
             return ()
+        from slamreplay.consistency.evidence.gathering import evidence_of
+
         used = {kind for kind in SENSED_KINDS for i in self.innovations if kind in i.source}
         return evidence_of(self.updates, self.references, self.view, used, self.left_out)
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.signal import lfilter, lfiltic
 
 from slamreplay.geometry.se2 import Array
 
@@ -72,6 +71,8 @@ def autocorrelation_of(reflection: Array, n: int) -> Array:
     model = np.append(1.0, -a)
     end = min(n, p + 1 + _memory(model))
     if end > p + 1:
+        from scipy.signal import lfilter, lfiltic  # takes most of a second to load
+
         state = lfiltic([1.0], model, rho[p:0:-1])
         rho[p + 1 : end] = lfilter([1.0], model, np.zeros(end - p - 1), zi=state)[0]
     return rho

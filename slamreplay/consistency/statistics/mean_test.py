@@ -17,7 +17,6 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.optimize import brentq
 from scipy.special import chdtr, chdtrc, chdtri
 
 from slamreplay.consistency.statistics.error_samples import ErrorSamples, error_samples
@@ -135,6 +134,8 @@ def _tails(dof: float, samples: ErrorSamples, mean: float) -> tuple[float, float
 
 def _interval(dof: float, samples: ErrorSamples) -> tuple[float, float]:
     """Where each tail is half of `NOMINAL`."""
+    from scipy.optimize import brentq  # takes half a second to load
+
     least = dof * max(1.0, samples.n_eff * math.exp(samples.spread * float(_NODES[0])))
     outer = [chdtri(least, p) / (least / dof) for p in (1.0 - 1e-6, 1e-6)]
     low = brentq(lambda m: _tails(dof, samples, m)[1] - NOMINAL / 2.0, outer[0], dof, xtol=1e-10)

@@ -11,7 +11,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from scipy.optimize import brentq
 from scipy.special import chdtr
 
 #: Scales beyond this are not told apart: the errors fill the gate evenly.
@@ -50,6 +49,7 @@ class Truncation:
         """
         if self.is_none:
             return math.sqrt(mean / k)
+        from scipy.optimize import brentq  # takes half a second to load
 
         def excess(scale: float) -> float:
             inner = Truncation(self.dof, self.cut / scale**2)
