@@ -14,9 +14,9 @@ from slamreplay.bundle.view import Bundle
 from slamreplay.consistency import CHECKS
 from slamreplay.consistency.answers import Suspicion, holm, raised
 from slamreplay.consistency.asking import ask
-from slamreplay.consistency.belief.credibility import nees_of_belief
 from slamreplay.consistency.context import CheckContext
 from slamreplay.consistency.evidence.nees import nees
+from slamreplay.consistency.evidence.parts import HEADING, POSE, POSITION, judged_parts
 from slamreplay.consistency.evidence.published import fresh_rows, published_belief
 from slamreplay.consistency.evidence.references import references_of, unused_references
 from slamreplay.consistency.evidence.source import Reference
@@ -114,15 +114,16 @@ def test_nees_is_scipys_mahalanobis():
     expected = [mahalanobis(e, np.zeros(3), inverse) ** 2 for e in result.error]
 
     np.testing.assert_allclose(result.joint, expected, rtol=1e-9)
-    np.testing.assert_allclose(result.yaw, result.error[:, 2] ** 2 / P[2, 2], rtol=1e-12)
+    np.testing.assert_allclose(
+        result.squared(HEADING), result.error[:, 2] ** 2 / P[2, 2], rtol=1e-12
+    )
     assert result.invalid == {}
-    assert result.has_cross_terms
 
 
 def test_a_consistent_belief_is_consistent_and_a_bold_one_is_told_its_factor():
-    honest = nees(*tracks()).summary("joint")
-    bold = nees(*tracks(scale=1 / 9)).summary("joint")
-    timid = nees(*tracks(scale=9.0)).summary("joint")
+    honest = nees(*tracks()).summary()
+    bold = nees(*tracks(scale=1 / 9)).summary()
+    timid = nees(*tracks(scale=9.0)).summary()
 
     assert honest.credibility == "consistent"
     assert (bold.credibility, timid.credibility) == ("overconfident", "underconfident")
@@ -175,7 +176,7 @@ def test_invalid_rows_are_counted_by_reason():
         "covariance not positive definite": 2,
     }
     assert np.isfinite(result.joint).sum() == 5
-    assert np.isfinite(result.xy).sum() == 6
+    assert np.isfinite(result.squared(POSITION)).sum() == 6
 
 
 def test_reference_is_never_extrapolated_and_not_carried_over_gaps():
@@ -192,8 +193,8 @@ def test_reference_without_heading_judges_the_position():
     xyyaw[:, 2] = np.nan
     result = nees(belief, PoseTrack.without_covariance("map", "base", truth.t_ns, xyyaw))
 
-    assert result.summary("xy").credibility == "consistent"
-    assert result.summary("yaw").test.n == 0
+    assert result.summary(POSITION).credibility == "consistent"
+    assert result.summary(HEADING).test.n == 0
     assert result.invalid == {"no reference heading": 200}
 
 
@@ -372,9 +373,10 @@ def test_without_coupling_position_and_heading_are_judged_apart():
     (finding,) = run("nees", log, truth)
 
     assert "heading" in finding.message
-    assert not nees_of_belief(
-        CheckContext(None, (Reference("survey", "/truth", truth),), log.view())
-    ).has_cross_terms
+    context = CheckContext(None, (Reference("survey", "/truth", truth),), log.view())
+    assert judged_parts(context.evidence[0], context.updates) == (POSITION, HEADING)
+    coupled = CheckContext(tracks()[0], context.references, bundle([]).view())
+    assert judged_parts(coupled.evidence[0], coupled.updates) == (POSE,)
 
 
 def test_held_covariances_are_one_update():

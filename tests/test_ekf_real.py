@@ -27,7 +27,7 @@ def found(log):
         held = nees(estimate.track, reference)
         error = held.error[np.isfinite(held.error).all(axis=1)]
         rmse = float(np.sqrt(np.mean(np.sum(error[:, :2] ** 2, axis=1))))
-        numbers[estimator.name] = rmse, held.summary("joint").test.mean
+        numbers[estimator.name] = rmse, held.summary().test.mean
         estimates[estimator.name] = estimate
     return numbers, estimates
 

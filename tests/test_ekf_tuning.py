@@ -39,11 +39,11 @@ ODD = Noise(
 LOG, TRUTH = world(5, ODD, seconds=250.0)
 
 
-def summary(evidence, truth, noise, part="joint"):
+def summary(evidence, truth, noise):
     out = filtered(evidence, replace(noise, mount_m=0.0, mount_rad=0.0), GATES)
     reference = PoseTrack.without_covariance("map", "base_link", evidence.row_ns, truth)
     track = PoseTrack("map", "base_link", evidence.row_ns, out.xyyaw, out.cov)
-    return nees(track, reference).summary(part)
+    return nees(track, reference).summary()
 
 
 def bearing_of(noise):

@@ -46,7 +46,7 @@ def test_nees_is_measured_against_the_logs_own_reference(lost):
     _, post, _ = lost
 
     assert post.reference_kind == "simulation"
-    assert post.nees.summary("joint").test.mean > 100.0
+    assert post.nees.summary().test.mean > 100.0
     said = [f.message for f in post.findings if f.id.startswith("SR-CON-0")]
     assert any("against simulation" in message for message in said)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from slamreplay.bundle.findings import FINDINGS
-from slamreplay.consistency.evidence.nees import PARTS
+from slamreplay.consistency.evidence.parts import HEADING, POSE, POSITION
 from slamreplay.consistency.evidence.source import SHARED_KINDS
 from slamreplay.report.evidence import Postmortem
 
@@ -40,7 +40,8 @@ def _decided(post: Postmortem) -> bool:
     """Whether a reference of its own told of the covariance, whatever another one could not."""
     if post.nees is None or post.reference_kind in SHARED_KINDS:
         return False
-    return any(post.nees.summary(part).credibility != "insufficient" for part in PARTS)
+    parts = (POSE, POSITION, HEADING)
+    return any(post.nees.summary(part).credibility != "insufficient" for part in parts)
 
 
 def title_of(id_: str) -> str:

@@ -52,7 +52,7 @@ def run_metrics(
             metrics["lost_share"] = float(off.mean())
     updates = nees_of_belief(asked)
     if updates is not None:
-        test = updates.summary("joint").test
+        test = updates.summary().test
         if test.n:
             metrics["nees_mean"], metrics["nees_n_eff"] = test.mean, test.n_eff
     return metrics

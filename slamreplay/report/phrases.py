@@ -97,7 +97,7 @@ def course_alt(post: Postmortem) -> str:
 
 def covariance_alt(post: Postmortem) -> str:
     """The covariance figure in words."""
-    mean = None if post.nees is None else post.nees.summary("joint").test.mean
+    mean = None if post.nees is None else post.nees.summary().test.mean
     if mean is None:
         return "Covariance ellipses along the believed path."
     return (

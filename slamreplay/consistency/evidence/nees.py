@@ -9,13 +9,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from slamreplay.bundle.track import PoseTrack
 from slamreplay.consistency.evidence.nees_summary import NeesSummary
+from slamreplay.consistency.evidence.parts import POSE, Part
 from slamreplay.consistency.statistics.mean_test import mean_test
 from slamreplay.consistency.statistics.whitening import whitened
 from slamreplay.geometry import se2
@@ -25,11 +26,6 @@ from slamreplay.geometry.transforms import clean_frame
 MAX_GAP_NS = 500_000_000
 #: The variance of a heading that may be any, uniform over the circle, rad^2: no heading is known.
 ANY_HEADING = np.pi**2 / 3.0
-
-Part = Literal["joint", "xy", "yaw"]
-PARTS: dict[Part, tuple[int, ...]] = {"joint": (0, 1, 2), "xy": (0, 1), "yaw": (2,)}
-
-NAMES: dict[Part, str] = {"joint": "the pose", "xy": "the position", "yaw": "the heading"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,34 +37,28 @@ class Nees:
         error: (N, 3) belief minus reference, m, m, rad; NaN where either is missing.
         cov: (N, 3, 3) the belief's plus the reference's own, in the same axes; NaN where the error
             is not to be held against it.
-        joint: (N,) of x y yaw, NaN where invalid.
-        xy: (N,) of the position alone.
-        yaw: (N,) of the heading alone.
         invalid: rows without a joint value, counted by reason.
-        has_cross_terms: whether any covariance couples position and heading. AMCL publishes none:
-            its joint value is an approximation, judge the parts.
         refusal: why nothing could be compared, None where it could.
     """
 
     t_ns: NDArray[np.int64]
     error: se2.Array
     cov: se2.Array
-    joint: se2.Array
-    xy: se2.Array
-    yaw: se2.Array
     invalid: Mapping[str, int]
-    has_cross_terms: bool
     refusal: str | None = None
 
-    def values(self, part: Part) -> se2.Array:
-        """(N,) NEES of one part."""
-        return {"joint": self.joint, "xy": self.xy, "yaw": self.yaw}[part]
+    @cached_property
+    def joint(self) -> se2.Array:
+        """(N,) NEES of x y yaw, NaN where invalid."""
+        return self.squared(POSE)
 
-    def summary(self, part: Part = "joint") -> NeesSummary:
+    def squared(self, part: Part) -> se2.Array:
+        """(N,) NEES of one part."""
+        return np.asarray(np.sum(part.white(self) ** 2, axis=1))
+
+    def summary(self, part: Part = POSE) -> NeesSummary:
         """The mean of one part against its interval."""
-        index = np.array(PARTS[part])
-        white = whitened(self.error[:, index], self.cov[:, index[:, None], index])
-        return NeesSummary(NAMES[part], mean_test(white))
+        return NeesSummary(f"the {part.name}", mean_test(part.white(self)))
 
 
 def nees(
@@ -108,7 +98,7 @@ def nees(
     with np.errstate(invalid="ignore"):
         headless = estimate.cov[:, 2, 2] > ANY_HEADING
     cov[headless, 2, :] = cov[headless, :, 2] = np.nan
-    parts = {part: _squared(error, cov, list(index)) for part, index in PARTS.items()}
+    joint = np.sum(whitened(error, cov) ** 2, axis=1)
     reasons = {
         "frames differ": np.full(len(estimate), refusal is not None),
         "no belief": ~estimate.has_pose,
@@ -117,17 +107,14 @@ def nees(
         "no heading known (any would do)": headless,
         "no reference heading": ~np.isfinite(error[:, 2]),
         "no covariance": ~np.isfinite(cov).all(axis=(1, 2)),
-        "covariance not positive definite": ~np.isfinite(parts["joint"]),
+        "covariance not positive definite": ~np.isfinite(joint),
     }
     invalid, left = {}, np.ones(len(estimate), dtype=bool)
     for reason, rows in reasons.items():  # each row counts once, under its first reason
         if (left & rows).any():
             invalid[reason] = int((left & rows).sum())
         left &= ~rows
-    cross = estimate.cov[:, :2, 2]
-    crossed = bool((np.isfinite(cross) & (cross != 0.0)).any())
-    return Nees(estimate.t_ns, error, cov, **parts, invalid=invalid, has_cross_terms=crossed,
-                refusal=refusal)  # fmt: skip
+    return Nees(estimate.t_ns, error, cov, invalid, refusal)
 
 
 def _at(reference: PoseTrack, t_ns: NDArray[np.int64], max_gap_ns: int) -> PoseTrack:
@@ -143,9 +130,3 @@ def _at(reference: PoseTrack, t_ns: NDArray[np.int64], max_gap_ns: int) -> PoseT
     xyyaw = there.xyyaw.copy()
     xyyaw[:, 2] = np.nan
     return PoseTrack(there.frame_id, there.child_frame_id, there.t_ns, xyyaw, there.cov)
-
-
-def _squared(error: se2.Array, cov: se2.Array, index: list[int]) -> se2.Array:
-    """(N,) e' P^-1 e of some of the axes, NaN where it has no value."""
-    white = whitened(error[:, index], cov[:, index][:, :, index])
-    return np.asarray(np.sum(white**2, axis=1))

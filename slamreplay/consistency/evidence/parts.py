@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
@@ -12,17 +13,29 @@ from slamreplay.consistency.statistics.whitening import whitened
 from slamreplay.geometry.se2 import Array
 
 
+class Held(Protocol):
+    """Errors (N, m) and what is claimed for them (N, m, m): an `Evidence`, or a `Nees`."""
+
+    @property
+    def error(self) -> Array:
+        """(N, m)."""
+
+    @property
+    def cov(self) -> Array:
+        """(N, m, m)."""
+
+
 @dataclass(frozen=True)
 class Part:
-    """Some axes of an `Evidence`, and what they are called in a sentence."""
+    """Some axes of errors, and what they are called in a sentence."""
 
     name: str
     axes: tuple[int, ...]
 
-    def white(self, evidence: Evidence) -> Array:
+    def white(self, held: Held) -> Array:
         """(N, m) whitened errors of these axes; NaN rows where they have no value."""
         index = list(self.axes)
-        return whitened(evidence.error[:, index], evidence.cov[:, index][:, :, index])
+        return whitened(held.error[:, index], held.cov[:, index][:, :, index])
 
 
 POSE, POSITION, HEADING = Part("pose", (0, 1, 2)), Part("position", (0, 1)), Part("heading", (2,))

@@ -125,7 +125,7 @@ def _draw_nees(axes: Axes, post: Postmortem, size: float) -> list[object]:
     assert nees is not None
     canvas.dress(axes, "", "NEES of x, y, yaw [1]", size)
     floor = 1e-2
-    summary = nees.summary("joint").test
+    summary = nees.summary().test
     s, value = canvas.thinned(post.seconds(nees.t_ns), nees.joint)
     axes.plot(
         s,
