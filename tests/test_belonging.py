@@ -14,12 +14,13 @@ from slamreplay.consistency.belief.amcl_limits import amcl_limits, is_amcl
 from slamreplay.consistency.belief.credibility import nees_of_belief
 from slamreplay.consistency.context import CheckContext
 from slamreplay.consistency.evidence.cloud_parts import mixed_up
-from slamreplay.consistency.evidence.nees import ANY_HEADING, nees
+from slamreplay.consistency.evidence.nees import nees
+from slamreplay.consistency.evidence.parts import HEADING, POSITION
 from slamreplay.estimators.amcl.cloud import cluster_of, moments
 from slamreplay.estimators.amcl.config import AmclConfig
 from slamreplay.estimators.amcl.filter import AmclFilter
 from slamreplay.geometry import se2
-from slamreplay.geometry.covariance import ros_from_planar
+from slamreplay.geometry.covariance import ANY_ANGLE, ros_from_planar
 from slamreplay.maps.grid import OccupancyGrid
 from slamreplay.testing.edits import rebuilt
 from slamreplay.testing.synthetic import START_NS, true_path
@@ -260,14 +261,14 @@ def test_amcl_is_known_by_what_its_covariances_have():
 def test_a_heading_that_may_be_any_has_no_nees():
     t_ns = START_NS + np.rint(T * 1e9).astype(np.int64)
     cov = np.tile(np.diag([0.01, 0.01, 0.01]), (len(T), 1, 1))
-    cov[:30, 2, 2] = ANY_HEADING + 0.1
+    cov[:30, 2, 2] = ANY_ANGLE + 0.1
     truth = PoseTrack.without_covariance("map", "base_link", t_ns, true_path(T))
     result = nees(PoseTrack("map", "base_link", t_ns, true_path(T), cov), truth)
 
     assert result.invalid == {"no heading known (any would do)": 30}
     assert np.isfinite(result.error).all()
-    assert np.isfinite(result.xy).all()
-    assert np.flatnonzero(np.isnan(result.yaw)).tolist() == list(range(30))
+    assert np.isfinite(result.squared(POSITION)).all()
+    assert np.flatnonzero(np.isnan(result.squared(HEADING))).tolist() == list(range(30))
 
 
 def test_a_sigma_that_is_wrong_is_said_with_what_it_does():

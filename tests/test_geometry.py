@@ -275,3 +275,14 @@ def test_only_static_edges_are_fixed():
     assert buffer.fixed("map", "odom") is None
     assert buffer.fixed("map", "elsewhere") is None
     np.testing.assert_array_equal(buffer.fixed("odom", "odom"), np.eye(4))
+
+
+def test_a_turn_about_the_parents_axis_is_scipys():
+    from scipy.spatial.transform import Rotation
+
+    poses = Rotation.random(20, random_state=0)
+    turned = se3.yawed(poses.as_quat(), 0.7)
+    expected = Rotation.from_rotvec([0.0, 0.0, 0.7]) * poses
+
+    off = (Rotation.from_quat(turned) * expected.inv()).magnitude()
+    np.testing.assert_allclose(off, 0.0, atol=1e-12)

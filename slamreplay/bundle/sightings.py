@@ -13,6 +13,7 @@ from slamreplay.bundle.tables import Table
 from slamreplay.bundle.track import PoseTrack
 from slamreplay.bundle.view import BundleView
 from slamreplay.geometry import se2, se3
+from slamreplay.geometry.covariance import ANY_ANGLE
 from slamreplay.geometry.transforms import TransformBuffer
 
 #: Kinds of references that are things which stand still and that the robot senses.
@@ -22,8 +23,6 @@ KINDS = ("fiducial", "dock")
 _NEAR_M, _PER_M, _YAW = 0.03, 0.04, 0.1
 #: An axis of a tag that is this much less level than its most level one is no heading.
 _LEVEL = 0.9
-#: Variance of a heading that may be anything, rad^2: uniform over the circle.
-_ANY_HEADING = np.pi**2 / 3.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,7 +88,7 @@ def sightings_of(view: BundleView, motion: PoseTrack) -> Sightings | None:
     yaw, surveyed = _headings(T, names[known], surveys)
     stated = _stated(table["covariance"][known], T_base_frame[known, :3, :3])
     cov = _with_usual(stated, T[:, :2, 3])
-    cov[np.isnan(yaw), 2, 2] = _ANY_HEADING
+    cov[np.isnan(yaw), 2, 2] = ANY_ANGLE
     return Sightings(
         table.t_ns[known],
         table["kind"][known],

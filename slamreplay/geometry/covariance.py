@@ -12,6 +12,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from slamreplay.geometry.se2 import Array, compose
 
+#: Variance of an angle that may be any, uniform over the circle, rad^2.
+ANY_ANGLE = np.pi**2 / 3.0
+
 _PLANAR = np.array([0, 1, 5])
 _ROTATION_FIRST = np.array([3, 4, 5, 0, 1, 2])
 

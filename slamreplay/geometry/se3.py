@@ -106,6 +106,13 @@ def quaternion_from_yaw(yaw: ArrayLike) -> Array:
     return np.stack([zero, zero, np.sin(half), np.cos(half)], axis=-1)
 
 
+def yawed(quaternion_xyzw: ArrayLike, yaw: float) -> Array:
+    """Quaternions (N, 4) after a turn by `yaw` rad about the parent's z axis: q_yaw q."""
+    x, y, z, w = np.asarray(quaternion_xyzw, dtype=np.float64).T
+    c, s = np.cos(yaw / 2.0), np.sin(yaw / 2.0)
+    return np.column_stack([c * x - s * y, c * y + s * x, c * z + s * w, c * w - s * z])
+
+
 def yaw_from_quaternion(quaternion_xyzw: ArrayLike) -> Array:
     """Heading in radians (...): the z angle of the z-y-x Euler angles, as tf's getYaw gives it."""
     q, _ = unit_quaternion(quaternion_xyzw)

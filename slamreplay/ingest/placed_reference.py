@@ -18,7 +18,7 @@ from slamreplay.bundle.schema import JUDGING_KINDS
 from slamreplay.errors import UsageError
 from slamreplay.geometry import se3
 from slamreplay.geometry.covariance import ros_turned
-from slamreplay.geometry.se2 import Array, transform_points
+from slamreplay.geometry.se2 import transform_points
 from slamreplay.ingest.rows import TopicRows
 
 #: Key of the topics file: where the reference's frame lies in the map, m, m and degrees.
@@ -59,17 +59,10 @@ def placed_reference(
         **topic.columns,
         "frame_id": np.full(len(topic), map_frame, dtype=object),
         "position_xyz": position,
-        "orientation_xyzw": _turned(topic.columns["orientation_xyzw"], float(pose[2])),
+        "orientation_xyzw": se3.yawed(topic.columns["orientation_xyzw"], float(pose[2])),
         "covariance": ros_turned(topic.columns["covariance"], R).reshape(-1, 36),
     }
     frame = str(topic.columns["frame_id"][0])
     reason = f"'{frame}' lies at {x:g} m, {y:g} m, {yaw_deg:g} deg in the map by the topics file"
     told = Loss(kind="repaired", what=f"poses of {topic.topic}", count=len(topic), reason=reason)
     return replace(topic, columns=columns), [told]
-
-
-def _turned(quaternion_xyzw: Array, yaw: float) -> Array:
-    """(N, 4) quaternions after a turn about the parent's z axis."""
-    x, y, z, w = np.asarray(quaternion_xyzw, dtype=np.float64).T
-    c, s = np.cos(yaw / 2.0), np.sin(yaw / 2.0)
-    return np.column_stack([c * x - s * y, c * y + s * x, c * z + s * w, c * w - s * z])

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from slamreplay.bundle.tables import Table
 from slamreplay.bundle.track import PoseTrack
 from slamreplay.bundle.view import BundleView
+from slamreplay.consistency.evidence.clouds import clouds_in
 from slamreplay.geometry import se2
-from slamreplay.geometry.transforms import clean_frame
 
 #: A cloud speaks for the update that is no farther away than this.
 NEAR_NS = 500_000_000
@@ -85,14 +85,9 @@ def belonging_of_robot(updates: PoseTrack, view: BundleView) -> Belonging | None
     """Of the robot's own localizer, by the clouds in the log; None without any."""
     from slamreplay.consistency.evidence.cloud_parts import mixed_up  # loads numba
 
-    clouds = view.role("particles")
-    if clouds is None or not len(clouds):
+    clouds = clouds_in(view, updates.frame_id)
+    if clouds is None:
         return None
-    frame = clean_frame(updates.frame_id)
-    clouds = clouds.take(np.array([clean_frame(f) == frame for f in clouds["frame_id"].tolist()]))
-    if not len(clouds):
-        return None
-    clouds = clouds.sorted_by_time()
     n = len(updates)
     seen, parted = np.zeros(n, dtype=bool), np.zeros(n, dtype=bool)
     worst, words, at_ns = 0.0, "", None

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from slamreplay.consistency.evidence.clouds import sound_particles
 from slamreplay.estimators.amcl.cloud import SHARE, cluster_of, moments
 from slamreplay.estimators.amcl.kernels import CELL_M, YAW_CELLS
 from slamreplay.geometry import se2
@@ -27,12 +28,9 @@ def mixed_up(
         particles: (M, 3) of the cloud.
         weights: (M,) or none.
     """
-    good = np.isfinite(particles).all(axis=1)
-    if not good.any():
+    particles, weights = sound_particles(particles, weights)
+    if not len(particles):
         return None
-    if len(weights) != len(particles) or not weights[good].sum() > 0.0:
-        weights = np.ones(len(particles))
-    particles, weights = particles[good], weights[good] / weights[good].sum()
     label = cluster_of(particles)
     carried = np.bincount(label, weights)
     heavy = np.flatnonzero((carried >= SHARE) | (carried == carried.max()))

@@ -20,12 +20,11 @@ from slamreplay.consistency.evidence.parts import POSE, Part
 from slamreplay.consistency.statistics.mean_test import mean_test
 from slamreplay.consistency.statistics.whitening import whitened
 from slamreplay.geometry import se2
+from slamreplay.geometry.covariance import ANY_ANGLE
 from slamreplay.geometry.transforms import clean_frame
 
 #: A reference is interpolated between samples no farther apart than this.
 MAX_GAP_NS = 500_000_000
-#: The variance of a heading that may be any, uniform over the circle, rad^2: no heading is known.
-ANY_HEADING = np.pi**2 / 3.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,7 +95,7 @@ def nees(
     left_out = np.zeros(len(order), dtype=bool) if left_out is None else left_out[order]
     cov[left_out] = np.nan
     with np.errstate(invalid="ignore"):
-        headless = estimate.cov[:, 2, 2] > ANY_HEADING
+        headless = estimate.cov[:, 2, 2] > ANY_ANGLE
     cov[headless, 2, :] = cov[headless, :, 2] = np.nan
     joint = np.sum(whitened(error, cov) ** 2, axis=1)
     reasons = {

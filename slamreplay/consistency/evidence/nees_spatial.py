@@ -17,11 +17,10 @@ import numpy as np
 
 from slamreplay.bundle.track import PoseTrack
 from slamreplay.bundle.view import BundleView
-from slamreplay.consistency.evidence.nees import ANY_HEADING
 from slamreplay.consistency.evidence.published import update_rows
 from slamreplay.consistency.evidence.spatial_track import SpatialTrack
 from slamreplay.geometry import se3
-from slamreplay.geometry.covariance import planar_from_ros
+from slamreplay.geometry.covariance import ANY_ANGLE, planar_from_ros
 from slamreplay.geometry.se2 import Array
 from slamreplay.geometry.transforms import clean_frame
 
@@ -57,12 +56,12 @@ def spatial_errors(
 
     The reference is interpolated between samples no farther apart than `max_gap_ns`, and its
     covariance is added where it is finite. NaN where either is missing, and for rotations about
-    which nothing is known (`ANY_HEADING`).
+    which nothing is known (`ANY_ANGLE`).
     """
     truth = reference.at(belief.t_ns, max_gap_ns)
     turned = belief.T[:, :3, :3] @ np.swapaxes(truth.T[:, :3, :3], 1, 2)
     error = np.hstack([belief.T[:, :3, 3] - truth.T[:, :3, 3], se3.rotation_vector(turned)])
     variance = np.diagonal(belief.cov, axis1=1, axis2=2)[:, 3:]
     with np.errstate(invalid="ignore"):
-        error[(variance > ANY_HEADING).any(axis=1), 3:] = np.nan
+        error[(variance > ANY_ANGLE).any(axis=1), 3:] = np.nan
     return error, belief.cov + np.where(np.isfinite(truth.cov), truth.cov, 0.0)

@@ -13,7 +13,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import chdtr, kolmogi, kolmogorov
 
-from slamreplay.consistency.statistics.error_samples import ErrorSamples, error_samples
+from slamreplay.consistency.statistics.error_samples import (
+    NODES,
+    WEIGHTS,
+    ErrorSamples,
+    error_samples,
+)
 from slamreplay.consistency.statistics.mean_test import N_EFF_MIN, NOMINAL
 from slamreplay.geometry.se2 import Array
 
@@ -21,10 +26,6 @@ from slamreplay.geometry.se2 import Array
 LEVELS = (0.5, 0.68, 0.9, 0.95, 0.99)
 #: Beyond this quantile an error is wild.
 WILD = 0.99
-
-# Gauss and Hermite's rule for the mean over a standard normal variable.
-_NODES, _WEIGHTS = np.polynomial.hermite_e.hermegauss(7)
-_WEIGHTS = _WEIGHTS / _WEIGHTS.sum()
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,8 +119,8 @@ def ks_p_value(distance: float, n_eff: float, spread: float = 0.0) -> float:
         spread: relative standard error of n_eff. The p-value is averaged over a log-normal one:
             where the number of samples is itself a guess, no D proves as much as it seems to.
     """
-    n = n_eff * np.exp(spread * _NODES)
-    return float(_WEIGHTS @ kolmogorov(_stephens(n) * distance))
+    n = n_eff * np.exp(spread * NODES)
+    return float(WEIGHTS @ kolmogorov(_stephens(n) * distance))
 
 
 def ks_samples(squares: ErrorSamples) -> float:

@@ -23,6 +23,10 @@ from slamreplay.geometry.se2 import Array
 #: The model is fitted again to every 4th, 16th, ... row while there are so many: a slow part under
 #: white noise lies beyond the lags that fit into one model.
 _ROWS_MIN, _THIN = 60, 4
+#: Gauss-Hermite nodes and weights of the standard normal: what rests on n_eff is averaged over
+#: n_eff exp(spread * node), for n_eff is itself an estimate.
+NODES, WEIGHTS = np.polynomial.hermite_e.hermegauss(7)
+WEIGHTS = WEIGHTS / WEIGHTS.sum()
 #: Standard normal quantile of 99.5 %.
 _SURE = 2.576
 

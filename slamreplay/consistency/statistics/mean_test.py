@@ -19,16 +19,18 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import chdtr, chdtrc, chdtri
 
-from slamreplay.consistency.statistics.error_samples import ErrorSamples, error_samples
+from slamreplay.consistency.statistics.error_samples import (
+    NODES,
+    WEIGHTS,
+    ErrorSamples,
+    error_samples,
+)
 from slamreplay.consistency.statistics.truncation import Truncation
 
 #: The nominal error probability of every interval that is printed.
 NOMINAL = 0.05
 #: Where even the upper end of n_eff's interval is below this, nothing is decided.
 N_EFF_MIN = 20
-#: Gauss-Hermite nodes and weights of the standard normal, for averages over n_eff.
-_NODES, _WEIGHTS = np.polynomial.hermite_e.hermegauss(7)
-_WEIGHTS = _WEIGHTS / _WEIGHTS.sum()
 
 
 @dataclass(frozen=True)
@@ -126,17 +128,17 @@ def _matched(dof: int, gate: Truncation | None) -> tuple[float, float]:
 
 def _tails(dof: float, samples: ErrorSamples, mean: float) -> tuple[float, float]:
     """Probabilities of a mean at least, and at most, as large from a consistent belief."""
-    worth = np.clip(samples.n_eff * np.exp(samples.spread * _NODES), 1.0, samples.n)
+    worth = np.clip(samples.n_eff * np.exp(samples.spread * NODES), 1.0, samples.n)
     total = dof * worth
     above, below = chdtrc(total, worth * mean), chdtr(total, worth * mean)
-    return float(_WEIGHTS @ above), float(_WEIGHTS @ below)
+    return float(WEIGHTS @ above), float(WEIGHTS @ below)
 
 
 def _interval(dof: float, samples: ErrorSamples) -> tuple[float, float]:
     """Where each tail is half of `NOMINAL`."""
     from scipy.optimize import brentq  # takes half a second to load
 
-    least = dof * max(1.0, samples.n_eff * math.exp(samples.spread * float(_NODES[0])))
+    least = dof * max(1.0, samples.n_eff * math.exp(samples.spread * float(NODES[0])))
     outer = [chdtri(least, p) / (least / dof) for p in (1.0 - 1e-6, 1e-6)]
     low = brentq(lambda m: _tails(dof, samples, m)[1] - NOMINAL / 2.0, outer[0], dof, xtol=1e-10)
     high = brentq(lambda m: _tails(dof, samples, m)[0] - NOMINAL / 2.0, dof, outer[1], xtol=1e-10)

@@ -9,12 +9,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from slamreplay.geometry.covariance import ANY_ANGLE
 from slamreplay.geometry.times import NO_STAMP, Times
 from slamreplay.ingest.decoders.decoder import Decoded, Decoder, Messages, Remark
 from slamreplay.ingest.decoders.fiducials import pose_of, tag_rows
-
-#: Variance of an angle that may be any, rad^2.
-_ANY_ANGLE = np.pi**2 / 3.0
 
 
 def _isaac(messages: Messages) -> Decoded:
@@ -91,7 +89,7 @@ def _landmarks(messages: Messages) -> Decoded:
     path = "tracking_from_landmark_transform"
     covariance = np.full((len(seen), 6, 6), np.nan)
     turned = seen.column("rotation_weight") > 0.0
-    covariance[~turned, 3:, 3:] = _ANY_ANGLE * np.eye(3)
+    covariance[~turned, 3:, 3:] = ANY_ANGLE * np.eye(3)
     return tag_rows(
         messages.frames()[rows],
         messages.stamps()[rows],
