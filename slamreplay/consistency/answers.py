@@ -9,12 +9,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
-from slamreplay.bundle.findings import Finding
+from slamreplay.bundle.findings import Finding, Severity
 from slamreplay.geometry.se2 import Array
+
+if TYPE_CHECKING:
+    from slamreplay.consistency.statistics.mean_test import MeanTest
 
 #: A suspicion is raised only below this, after Holm's correction over the questions of a log.
 P_ACCUSE = 1e-3
@@ -33,6 +37,25 @@ class Suspicion:
 
 
 Answer = Finding | Suspicion
+
+
+def about_mean(
+    id_: str, severity: Severity, message: str, t_ns: NDArray[np.int64], test: MeanTest
+) -> Finding:
+    """A finding whose numbers are those of a mean and its interval, over times (N,), N > 0."""
+    return Finding(
+        id_,
+        severity,
+        message,
+        start_ns=int(t_ns[0]),
+        end_ns=int(t_ns[-1]),
+        value=test.mean,
+        low=test.low,
+        high=test.high,
+        unit="1",
+        n=test.n,
+        n_eff=test.n_eff,
+    )
 
 
 def holm(p_values: ArrayLike) -> Array:

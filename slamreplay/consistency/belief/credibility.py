@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from slamreplay.bundle.findings import Finding, Severity
-from slamreplay.consistency.answers import P_ACCUSE, Answer, Suspicion
+from slamreplay.consistency.answers import P_ACCUSE, Answer, Suspicion, about_mean
 from slamreplay.consistency.belief.amcl_limits import amcl_limits
 from slamreplay.consistency.context import CheckContext
 from slamreplay.consistency.evidence.nees import Nees, nees
@@ -73,19 +73,8 @@ def _suspicion(told: _Told, limits: str) -> Suspicion:
     severity: Severity = "error" if is_gross else "warning"
     note = f" ({evidence.note})" if evidence.note else ""
     effect = _effect(evidence, part, summary)
-    finding = Finding(
-        "SR-CON-001",
-        severity,
-        f"{summary.sentence}, against {evidence.source}{note}{effect}{limits}",
-        start_ns=int(evidence.t_ns[0]),
-        end_ns=int(evidence.t_ns[-1]),
-        value=test.mean,
-        low=test.low,
-        high=test.high,
-        unit="1",
-        n=test.n,
-        n_eff=test.n_eff,
-    )
+    text = f"{summary.sentence}, against {evidence.source}{note}{effect}{limits}"
+    finding = about_mean("SR-CON-001", severity, text, evidence.t_ns, test)
     p = test.p_small if evidence.at_most else test.p_value
     if evidence.shared and not is_gross:
         p = None  # the scans that both are made of may be what is wrong

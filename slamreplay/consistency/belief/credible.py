@@ -5,7 +5,7 @@ from __future__ import annotations
 from slamreplay.bundle.findings import Finding
 from slamreplay.consistency.answers import P_ACCUSE, Suspicion
 from slamreplay.consistency.context import CheckContext
-from slamreplay.consistency.evidence.parts import judged_parts
+from slamreplay.consistency.evidence.parts import exact_parts
 from slamreplay.consistency.statistics.credibility_index import CredibilityIndex, credibility_index
 
 #: A factor of 2 in the variance: beyond it a covariance misleads.
@@ -15,15 +15,10 @@ LARGE_DB = 3.0
 def check(context: CheckContext) -> tuple[Suspicion, ...]:
     """SR-CON-005 from the best source; that there are too few samples is said by SR-CON-003.
 
-    A single axis has one direction only, which SR-CON-001 judges. What shares evidence with the
-    belief, or has only a bound of a covariance, is not asked: its errors are not distributed as it
-    claims.
+    A single axis has one direction only, which SR-CON-001 judges.
     """
-    evidence = next((e for e in context.evidence if e.is_exact), None)
-    if context.updates is None or evidence is None:
-        return ()
     answers = []
-    for part in judged_parts(evidence, context.updates):
+    for evidence, part in exact_parts(context.evidence, context.updates):
         found = credibility_index(part.white(evidence)) if len(part.axes) > 1 else None
         if found is None or not found.sufficient:
             continue

@@ -5,7 +5,7 @@ from __future__ import annotations
 from slamreplay.bundle.findings import Finding
 from slamreplay.consistency.answers import Suspicion
 from slamreplay.consistency.context import CheckContext
-from slamreplay.consistency.evidence.parts import judged_parts
+from slamreplay.consistency.evidence.parts import exact_parts
 from slamreplay.consistency.statistics.distribution import LEVELS, WILD, Distribution, distribution
 
 #: The shape is off below this `p_shape`, which rather exceeds the true one: of independent
@@ -14,16 +14,9 @@ SHAPE_OFF = 0.1
 
 
 def check(context: CheckContext) -> tuple[Suspicion, ...]:
-    """SR-CON-004 from the best source; that there are too few samples is said by SR-CON-003.
-
-    What shares evidence with the belief, or has only a bound of a
-    covariance, is not asked: its errors are not distributed as it claims.
-    """
-    evidence = next((e for e in context.evidence if e.is_exact), None)
-    if context.updates is None or evidence is None:
-        return ()
+    """SR-CON-004 from the best source; that there are too few samples is said by SR-CON-003."""
     answers = []
-    for part in judged_parts(evidence, context.updates):
+    for evidence, part in exact_parts(context.evidence, context.updates):
         found = distribution(part.white(evidence))
         if found is None or not found.sufficient:
             continue

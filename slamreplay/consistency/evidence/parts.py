@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -42,6 +43,20 @@ POSE, POSITION, HEADING = Part("pose", (0, 1, 2)), Part("position", (0, 1)), Par
 #: In space position and rotation are judged apart, so that it is told which of them is off.
 SPATIAL = (Part("position", (0, 1, 2)), Part("rotation", (3, 4, 5)))
 SPATIAL_POSE = Part("pose", (0, 1, 2, 3, 4, 5))
+
+
+def exact_parts(
+    evidence: Sequence[Evidence], updates: PoseTrack | None
+) -> list[tuple[Evidence, Part]]:
+    """The judged parts of the best source of which the covariance is claimed exactly.
+
+    What shares evidence with the belief, or has only a bound of a covariance, is none: its errors
+    are not distributed as it claims.
+    """
+    best = next((e for e in evidence if e.is_exact), None)
+    if best is None or updates is None:
+        return []
+    return [(best, part) for part in judged_parts(best, updates)]
 
 
 def judged_parts(evidence: Evidence, updates: PoseTrack) -> tuple[Part, ...]:

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.special import bdtrc, chdtrc, chdtri
 
 from slamreplay.bundle.findings import Finding, Severity
-from slamreplay.consistency.answers import Answer, Suspicion
+from slamreplay.consistency.answers import Answer, Suspicion, about_mean
 from slamreplay.consistency.context import CheckContext
 from slamreplay.consistency.innovations.innovation_sets import InnovationSet, innovation_sets
 from slamreplay.consistency.statistics.mean_test import MeanTest, mean_test
@@ -83,20 +83,9 @@ def _size(seen: InnovationSet, tests: NisTests) -> Suspicion:
     if test is not joint:
         which = f"the {seen.axes[tests.axes.index(test)]} {which[4:]}"
     ratio = test.ratio or 0.0
-    finding = Finding(
-        "SR-CON-006",
-        _severity(ratio),
-        f"{which} {_sentence(ratio)}: {_numbers(test)}{_by_axis(seen, tests)}"
-        f"{_outliers(tests)}{_left_out(seen)}",
-        start_ns=int(seen.t_ns[0]),
-        end_ns=int(seen.t_ns[-1]),
-        value=test.mean,
-        low=test.low,
-        high=test.high,
-        unit="1",
-        n=test.n,
-        n_eff=test.n_eff,
-    )
+    text = f"{which} {_sentence(ratio)}: {_numbers(test)}{_by_axis(seen, tests)}"
+    text += f"{_outliers(tests)}{_left_out(seen)}"
+    finding = about_mean("SR-CON-006", _severity(ratio), text, seen.t_ns, test)
     return Suspicion(finding, tests.p_value)
 
 

@@ -13,6 +13,13 @@ from numpy.typing import ArrayLike
 from slamreplay.geometry.se2 import Array
 
 
+def lagged_sums(series: Array) -> Array:
+    """Sums of products at lags 0 to N-1 of each column of (N, ...), as they are."""
+    n = len(series)
+    power = np.abs(np.fft.rfft(series, 2 * n, axis=0)) ** 2  # zero-padded, or the ends would meet
+    return np.asarray(np.fft.irfft(power, 2 * n, axis=0)[:n])
+
+
 def autocorrelation(series: ArrayLike) -> Array:
     """(N,) autocorrelation of a series (N,) at lags 0 to N-1, divided by N at every lag.
 
@@ -23,9 +30,7 @@ def autocorrelation(series: ArrayLike) -> Array:
     n = len(x)
     if not n:
         return np.empty(0)
-    x = x - x.mean()
-    power = np.abs(np.fft.rfft(x, 2 * n)) ** 2  # zero-padded, or the ends would meet
-    covariance = np.fft.irfft(power, 2 * n)[:n]
+    covariance = lagged_sums(x - x.mean())
     return np.asarray(covariance / covariance[0]) if covariance[0] > 0.0 else np.ones(n)
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from slamreplay.consistency.statistics.effective_samples import lagged_sums
 from slamreplay.geometry.se2 import Array
 
 
@@ -24,8 +25,7 @@ def sign_correlation(white: ArrayLike) -> Array:
     n = len(signs)
     if not n:
         return np.empty(0)
-    power = np.abs(np.fft.rfft(signs, 2 * n, axis=0)) ** 2  # zero-padded, or the ends would meet
-    products = np.fft.irfft(power, 2 * n, axis=0)[:n].mean(axis=1) / n
+    products = lagged_sums(signs).mean(axis=1) / n
     return np.asarray(np.sin(np.pi / 2.0 * np.clip(products, -1.0, 1.0)))
 
 
