@@ -3,9 +3,9 @@
 import numpy as np
 
 from slamreplay.bundle.track import PoseTrack
-from slamreplay.estimators.ekf.filter import Evidence
 from slamreplay.estimators.ekf.noise import Noise
 from slamreplay.estimators.ekf.observations import Observations
+from slamreplay.estimators.ekf.passing import Evidence
 from slamreplay.estimators.start import Start
 from slamreplay.geometry import se2
 

@@ -15,9 +15,10 @@ from slamreplay.bundle.track import PoseTrack
 from slamreplay.bundle.view import BundleView
 from slamreplay.errors import NotApplicableError
 from slamreplay.estimators.ekf import kernels
-from slamreplay.estimators.ekf.filter import Evidence, Filtered, filtered, gates_of
+from slamreplay.estimators.ekf.filter import filtered, gates_of
 from slamreplay.estimators.ekf.noise import Noise
 from slamreplay.estimators.ekf.observations import observations_of
+from slamreplay.estimators.ekf.passing import Evidence, Filtered
 from slamreplay.estimators.ekf.tuning import tuned
 from slamreplay.estimators.inputs import need_odometry
 from slamreplay.estimators.start import DEFAULT_COV, GLOBAL, OFFSET, ROTATE, Start, starts

@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slamreplay.estimators.ekf import kernels
-from slamreplay.estimators.ekf.filter import Filtered
 from slamreplay.estimators.ekf.noise import Noise
 from slamreplay.estimators.ekf.observations import Observations
+from slamreplay.estimators.ekf.passing import Filtered
 from slamreplay.geometry import se2
 
 #: Share of sightings that are taken to mean nothing: a wrong name, a glimpse of something else.

@@ -14,10 +14,11 @@ from numpy.typing import NDArray
 from scipy.optimize import OptimizeResult, minimize
 
 from slamreplay.bundle.track import PoseTrack
-from slamreplay.estimators.ekf.filter import Evidence, Filtered, filtered
+from slamreplay.estimators.ekf.filter import filtered
 from slamreplay.estimators.ekf.likelihood import log_densities, score_vectors
 from slamreplay.estimators.ekf.motion import Motion
 from slamreplay.estimators.ekf.noise import Noise
+from slamreplay.estimators.ekf.passing import Evidence, Filtered
 from slamreplay.estimators.start import Start
 from slamreplay.geometry import se2
 from slamreplay.geometry.times import NS_PER_S, ns
