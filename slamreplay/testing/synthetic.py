@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,15 +12,31 @@ from slamreplay.bundle.manifest import Clock, FrameEdge, Frames, Manifest, MapVe
 from slamreplay.bundle.schema import TABLES
 from slamreplay.bundle.tables import Table
 from slamreplay.bundle.view import Bundle
-from slamreplay.geometry import se2, se3
+from slamreplay.geometry import se2
 from slamreplay.geometry.covariance import ros_from_planar
-from slamreplay.geometry.times import NS_PER_S, ns
+from slamreplay.geometry.times import ns
 from slamreplay.maps.grid import OccupancyGrid
 from slamreplay.maps.raycast import cast_rays
+from slamreplay.testing.synthetic_rows import (
+    LATENCY_NS,
+    START_NS,
+    ns_of,
+    pose_columns,
+    table_of,
+    tf_rows,
+)
 
-START_NS = 1_700_000_000 * NS_PER_S
-#: How much later than its stamp a message is recorded.
-LATENCY_NS = 5_000_000
+__all__ = [
+    "LATENCY_NS",
+    "MOUNT_XYYAW",
+    "RANGE_MAX_M",
+    "START_NS",
+    "TAGS_XYYAW",
+    "room_grid",
+    "synthetic_bundle",
+    "true_path",
+]
+
 #: The laser on the robot; neither straight nor central, so that a forgotten mount shows.
 MOUNT_XYYAW = np.array([0.15, 0.02, 0.05])
 RANGE_MAX_M = 10.0
@@ -94,7 +109,7 @@ def synthetic_bundle(
     odometry_s = np.arange(0.0, seconds + 0.05, 0.05)
     belief_s = np.arange(0.0, seconds, 0.5)
     T_odom_base = _drifting(true_path(odometry_s), rng)
-    at_belief = se2.interpolate(_ns(odometry_s), T_odom_base, _ns(belief_s))
+    at_belief = se2.interpolate(ns_of(odometry_s), T_odom_base, ns_of(belief_s))
     off = np.where((belief_s >= offset_from_s)[:, None], np.asarray(offset), 0.0)
     noise = rng.normal(0.0, [0.01, 0.01, 0.003], (len(belief_s), 3))
     T_map_base = se2.compose(true_path(belief_s), off + noise)
@@ -105,12 +120,12 @@ def synthetic_bundle(
         "references": _poses("references", "/truth", odometry_s, true_path(odometry_s), 1e-6),
     }
     transforms = [
-        _tf("odom", "base_link", odometry_s, T_odom_base),
-        _tf("base_link", "laser", np.zeros(1), MOUNT_XYYAW[None], is_static=True),
+        tf_rows("odom", "base_link", odometry_s, T_odom_base),
+        tf_rows("base_link", "laser", np.zeros(1), MOUNT_XYYAW[None], is_static=True),
     ]
     if with_belief:
         T_map_odom = se2.compose(T_map_base, se2.inverse(at_belief))
-        transforms.append(_tf("map", "odom", belief_s, T_map_odom, ahead_s=0.1))
+        transforms.append(tf_rows("map", "odom", belief_s, T_map_odom, ahead_s=0.1))
         tables["poses"] = _poses("poses", "/amcl_pose", belief_s, T_map_base, 1e-3)
     if with_initial_pose:
         start = se2.compose(true_path(np.zeros(1)), np.array([0.1, -0.1, 0.05]))
@@ -119,7 +134,7 @@ def synthetic_bundle(
         tags = _sightings(np.arange(0.0, seconds, 0.25), seed)
         tables["references"] = Table.concat(TABLES["references"], [tables["references"], tags])
         for k, place in enumerate(se2.compose(room_grid().origin_xyyaw, np.nan_to_num(TAGS_XYYAW))):
-            tag = _tf("map", f"tag_{k}", np.zeros(1), place[None], is_static=True)
+            tag = tf_rows("map", f"tag_{k}", np.zeros(1), place[None], is_static=True)
             transforms.append(tag)
     tables["transforms"] = Table.concat(TABLES["transforms"], transforms)
     grids = {room_grid().version: room_grid()} if with_map else {}
@@ -196,7 +211,7 @@ def _scans(t_s: NDArray[np.float64], world: OccupancyGrid, rng: np.random.Genera
         world, laser, angle_min + step * np.arange(_BEAMS, dtype=np.float64), RANGE_MAX_M
     )
     ranges = ranges + rng.normal(0.0, 0.01, ranges.shape)
-    return _table(
+    return table_of(
         "scans",
         "/scan",
         t_s,
@@ -223,7 +238,7 @@ def _sightings(t_s: NDArray[np.float64], seed: int) -> Table:
     xyyaw = np.column_stack(
         [reach * np.cos(bearing), reach * np.sin(bearing), seen[row, tag, 2] + noise[:, 2]]
     )
-    return _table(
+    return table_of(
         "references",
         "/tags",
         t_s[row],
@@ -231,7 +246,7 @@ def _sightings(t_s: NDArray[np.float64], seed: int) -> Table:
         frame_id="base_link",
         child_frame_id=[f"tag_{k}" for k in tag],
         covariance=np.full((len(row), 36), np.nan),
-        **_pose_columns(xyyaw),
+        **pose_columns(xyyaw),
     )
 
 
@@ -239,13 +254,13 @@ def _odometry(t_s: NDArray[np.float64], xyyaw: se2.Array) -> Table:
     speed = np.linalg.norm(np.gradient(xyyaw[:, :2], 0.05, axis=0), axis=1)
     turn = np.gradient(np.unwrap(xyyaw[:, 2]), 0.05)
     zero = np.zeros_like(speed)
-    return _table(
+    return table_of(
         "odometry",
         "/odom",
         t_s,
         frame_id="odom",
         child_frame_id="base_link",
-        **_pose_columns(xyyaw),
+        **pose_columns(xyyaw),
         pose_covariance=np.full((len(t_s), 36), np.nan),
         linear_velocity_xyz=np.column_stack([speed, zero, zero]),
         angular_velocity_xyz=np.column_stack([zero, zero, turn]),
@@ -264,58 +279,12 @@ def _poses(
     # One and the same covariance throughout would be a placeholder, not an estimate.
     breathing = 1.0 + 1e-6 * np.sin(np.arange(len(t_s)))
     cov = breathing[:, None, None] * np.diag([variance, variance, variance / 4])
-    return _table(
+    return table_of(
         name,
         topic,
         t_s,
         frame_id="map",
         covariance=ros_from_planar(cov),
-        **_pose_columns(xyyaw),
+        **pose_columns(xyyaw),
         **extra,
     )
-
-
-def _tf(
-    parent: str,
-    child: str,
-    t_s: NDArray[np.float64],
-    xyyaw: se2.Array,
-    *,
-    is_static: bool = False,
-    ahead_s: float = 0.0,
-) -> Table:
-    pose = _pose_columns(xyyaw)
-    table = _table(
-        "transforms",
-        "/tf_static" if is_static else "/tf",
-        t_s,
-        parent_frame=parent,
-        child_frame=child,
-        is_static=is_static,
-        translation_xyz=pose["position_xyz"],
-        rotation_xyzw=pose["orientation_xyzw"],
-    )
-    return table.replace(t_ns=table.t_ns + ns(ahead_s), t_sensor_ns=table.t_ns + ns(ahead_s))
-
-
-def _pose_columns(xyyaw: se2.Array) -> dict[str, se2.Array]:
-    position = np.column_stack([xyyaw[:, :2], np.zeros(len(xyyaw))])
-    return {"position_xyz": position, "orientation_xyzw": se3.quaternion_from_yaw(xyyaw[:, 2])}
-
-
-def _table(name: str, topic: str, t_s: NDArray[np.float64], **columns: Any) -> Table:
-    """A table whose scalars are repeated for every row."""
-    t_ns = _ns(t_s)
-    whole: dict[str, Any] = {
-        "t_ns": t_ns,
-        "t_sensor_ns": t_ns,
-        "t_log_ns": t_ns + LATENCY_NS,
-        "topic": topic,
-    }
-    whole |= columns
-    rows = {k: [v] * len(t_ns) if np.ndim(v) == 0 else v for k, v in whole.items()}
-    return Table(TABLES[name], rows)
-
-
-def _ns(t_s: NDArray[np.float64]) -> NDArray[np.int64]:
-    return np.rint(np.asarray(t_s) * NS_PER_S).astype(np.int64) + START_NS
