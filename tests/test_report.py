@@ -20,7 +20,10 @@ from slamreplay.bundle.manifest import Source
 from slamreplay.bundle.products import ChangedRegion, Changes, Hindsight
 from slamreplay.bundle.run import Estimate, Run, Trial
 from slamreplay.bundle.track import PoseTrack
+from slamreplay.consistency.belief.summary import ConsistencySummary, PartSummary
 from slamreplay.consistency.evidence.nees import nees
+from slamreplay.consistency.statistics.distribution import distribution
+from slamreplay.consistency.statistics.mean_test import mean_test
 from slamreplay.errors import OutputError
 from slamreplay.maps.map_server import read_map
 from slamreplay.report.assess import not_assessable
@@ -404,6 +407,19 @@ def test_innovations_stand_beside_what_chance_allows(post, bare):
     assert page.rows[3][3].aside == "too few to judge"
     assert innovations(post).rows == innovations(bare).rows == ()
     assert "Is what it measures" not in html(post)
+
+
+def test_a_belief_without_covariance_is_said_to_be_judged_by_its_particles(bare):
+    said = "no covariance of the belief, so its own uncertainty cannot be judged"
+    assert said in html(bare)
+    white = np.random.default_rng(0).standard_normal((60, 2))
+    mean = mean_test(white)
+    part = PartSummary("position", mean, mean.p_value, None, distribution(white), None)
+    summary = ConsistencySummary("survey /truth", "survey", shared=False, at_most="", parts=(part,))
+    page = html(replace(bare, consistency=(summary,)))
+
+    assert said not in page
+    assert "judged by the particles of the localizer" in page
 
 
 def test_what_a_run_leaves_undecided_is_no_reason_for_the_robots_own_belief(post):
