@@ -8,6 +8,7 @@ import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +17,7 @@ from slamreplay.bundle.track import PoseTrack
 from slamreplay.errors import BundleError
 from slamreplay.geometry.se2 import Array
 
-RUN_FORMAT = 1
+RUN_FORMAT = 2
 
 
 @dataclass(frozen=True)
@@ -47,7 +48,7 @@ class Trial:
 
 @dataclass(frozen=True, eq=False)
 class Innovations:
-    """What each measurement said against the prediction, one source per set.
+    """What each measurement said against the prediction, one source per set: the residual ledger.
 
     Attributes:
         source: table or sensor.
@@ -56,6 +57,13 @@ class Innovations:
         S: (N, m, m) covariance predicted for it, from the prior.
         accepted: (N,) whether the update used it.
         axes: m names of what was measured, with their units: "range m"; empty where not told.
+        frame_id: frame in whose axes the residual is; empty where not told.
+        moved: (N, 3) belief after minus before, x y in the belief's frame and wrapped yaw; NaN
+            where that is not known.
+        about: (N,) what was measured: a landmark's name, the two ends of a closure; may be empty.
+        score: (N,) how well a match fits, 0 to 1; NaN where nothing was matched.
+        is_predicted: whether S is what the estimator itself predicted, so that NIS may judge it;
+            otherwise it is made for the ledger only.
     """
 
     source: str
@@ -64,6 +72,31 @@ class Innovations:
     S: Array
     accepted: NDArray[np.bool_]
     axes: tuple[str, ...] = ()
+    frame_id: str = ""
+    moved: Array = field(default_factory=lambda: np.empty((0, 3)))
+    about: NDArray[np.str_] = field(default_factory=lambda: np.empty(0, dtype="U1"))
+    score: Array = field(default_factory=lambda: np.empty(0))
+    is_predicted: bool = True
+
+    def __post_init__(self) -> None:
+        n = len(self.t_ns)
+        empty = {"moved": (n, 3), "score": (n,)}
+        for name, shape in empty.items():
+            if np.shape(getattr(self, name)) != shape and not len(getattr(self, name)):
+                object.__setattr__(self, name, np.full(shape, np.nan))
+        about = np.asarray(self.about, dtype=np.str_)
+        object.__setattr__(self, "about", about if len(about) else np.full(n, ""))
+
+    @property
+    def nis(self) -> Array:
+        """(N,) normalised innovation squared r' S^-1 r; NaN where S is not known."""
+        S, r = np.asarray(self.S), np.asarray(self.residual)
+        known = np.isfinite(S).all(axis=(1, 2)) & np.isfinite(r).all(axis=1)
+        out = np.full(len(r), np.nan)
+        L = np.linalg.cholesky(S[known])
+        white = np.linalg.solve(L, r[known, :, None])[..., 0]
+        out[known] = (white**2).sum(axis=1)
+        return out
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,6 +139,8 @@ def run_bytes(run: Run) -> bytes:
         arrays |= {"t_ns": track.t_ns, "xyyaw": track.xyyaw, "cov": track.cov}
         head["innovations"] = [i.source for i in run.estimate.innovations]
         head["axes"] = [i.axes for i in run.estimate.innovations]
+        head["frame_ids"] = [i.frame_id for i in run.estimate.innovations]
+        head["are_predicted"] = [i.is_predicted for i in run.estimate.innovations]
         head["scalars"] = dict(run.estimate.scalars)
         for k, i in enumerate(run.estimate.innovations):
             arrays |= {f"innovation{k}.{n}": getattr(i, n) for n in _INNOVATION}
@@ -133,14 +168,8 @@ def read_run(path: Path) -> Run:
                 return Run(trial, None, head["not_applicable"])
             frame, child = head["frames"]
             track = PoseTrack(frame, child, arrays["t_ns"], arrays["xyyaw"], arrays["cov"])
-            axes = head.get("axes", [[]] * len(head["innovations"]))  # older runs have none
             innovations = tuple(
-                Innovations(
-                    source,
-                    **{n: arrays[f"innovation{k}.{n}"] for n in _INNOVATION},
-                    axes=tuple(axes[k]),
-                )
-                for k, source in enumerate(head["innovations"])
+                _innovations(head, arrays, k) for k in range(len(head["innovations"]))
             )
             diagnostics = {
                 name.removeprefix("diagnostic."): arrays[name]
@@ -154,4 +183,14 @@ def read_run(path: Path) -> Run:
     return Run(trial, estimate, head["not_applicable"])
 
 
-_INNOVATION = ("t_ns", "residual", "S", "accepted")
+def _innovations(head: Mapping[str, Any], arrays: Any, k: int) -> Innovations:
+    return Innovations(
+        head["innovations"][k],
+        **{name: arrays[f"innovation{k}.{name}"] for name in _INNOVATION},
+        axes=tuple(head["axes"][k]),
+        frame_id=head["frame_ids"][k],
+        is_predicted=head["are_predicted"][k],
+    )
+
+
+_INNOVATION = ("t_ns", "residual", "S", "accepted", "moved", "about", "score")
