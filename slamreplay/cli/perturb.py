@@ -51,6 +51,10 @@ _COLUMNS = (
     ("max [rad]", "baseline_max_rad"),
     ("rmse to ref. [m]", "reference_rmse_m"),
 )
+_RELATIONS = (("relations [m]", "relations_m"), ("relations [rad]", "relations_rad"))
+
+
+_FINE = {key for _, key in _RELATIONS}
 
 
 def register(app: typer.Typer) -> None:
@@ -148,14 +152,16 @@ def perturb(
 def _text(rows: list[dict[str, Any]]) -> str:
     """The trials as a table: every estimator's baseline, and below it what changes from it."""
     order = list(dict.fromkeys(str(row["estimator"]) for row in rows))
-    lines = [["estimator", "perturbation", "level", *(title for title, _ in _COLUMNS)]]
+    has_relations = any(row["metrics"]["relations_n"] for row in rows)
+    columns = (*_COLUMNS, *_RELATIONS) if has_relations else _COLUMNS
+    lines = [["estimator", "perturbation", "level", *(title for title, _ in columns)]]
     for row in sorted(rows, key=lambda row: order.index(str(row["estimator"]))):
         level = "" if row["level"] is None else f"{row['level']:g} {row['unit']}"
         line = [str(row["estimator"]), str(row["perturbation"] or "(baseline)"), level]
         if row["not_applicable"]:
             line.append(f"not applicable: {row['not_applicable']}")
         else:
-            line += [_number(row["metrics"], key) for _, key in _COLUMNS]
+            line += [_number(row["metrics"], key) for _, key in columns]
         lines.append(line)
     full = [line for line in lines if len(line) == len(lines[0])]
     widths = [max(len(line[k]) for line in full) for k in range(len(lines[0]))]
@@ -171,4 +177,4 @@ def _text(rows: list[dict[str, Any]]) -> str:
 
 def _number(metrics: Metrics, key: str) -> str:
     value = metrics[key]
-    return "-" if value is None else f"{value:.3f}"
+    return "-" if value is None else f"{value:.4f}" if key in _FINE else f"{value:.3f}"
