@@ -136,7 +136,7 @@ def test_run_reads_back_what_was_written(tmp_path):
     assert back.estimate.scalars == {"recoveries": 2.0}
 
 
-def test_a_run_of_another_format_is_refused(tmp_path):
+def test_a_run_of_another_format_is_refused_with_what_to_do(tmp_path):
     track = PoseTrack.without_covariance("map", "base", np.arange(1), np.ones((1, 3)))
     with np.load(io.BytesIO(run_bytes(Run(Trial("id", "amcl", 7), Estimate(track))))) as arrays:
         older = dict(arrays)
@@ -144,8 +144,9 @@ def test_a_run_of_another_format_is_refused(tmp_path):
     older["head"] = np.frombuffer(json.dumps(head).encode(), dtype=np.uint8)
     np.savez(tmp_path / "r.npz", **older)
 
-    with pytest.raises(BundleError, match="run format 1"):
+    with pytest.raises(BundleError, match="run format 1, this program reads 2") as refused:
         read_run(tmp_path / "r.npz")
+    assert refused.value.hint == "run perturb again"
 
 
 def test_ragged_take_repeats_and_reorders():
