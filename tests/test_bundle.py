@@ -165,3 +165,14 @@ def test_unwritable_place_is_refused_before_the_work(tmp_path):
     if os.geteuid() != 0:  # root may write anywhere
         with pytest.raises(OutputError, match="takes no new entries"):
             check_target(tmp_path / "locked" / "b", "manifest.json")
+
+
+def test_a_robot_that_stood_is_where_it_was_however_seldom_it_says_so():
+    """Samples 4 s apart: the first two agree, the next is a metre on; 20 s later nobody knows."""
+    t_ns = np.array([0, 4, 8, 30]) * 1_000_000_000
+    xyyaw = np.array([[1.0, 2.0, 0.1], [1.0, 2.02, 0.1], [2.0, 2.0, 0.1], [2.0, 2.0, 0.1]])
+    track = PoseTrack.without_covariance("odom", "base", t_ns, xyyaw)
+
+    at = track.at(np.array([2, 6, 20]) * 1_000_000_000).xyyaw
+    np.testing.assert_allclose(at[0], [1.0, 2.01, 0.1])
+    assert np.isnan(at[1:]).all()

@@ -26,7 +26,7 @@ LEAST_POINTS = 10
 
 @dataclass(frozen=True, eq=False)
 class LocalTrajectory:
-    """Every scan in a frame that drifts but does not jump, but for breaks, and the nodes of a graph.
+    """Every scan in a frame that drifts and only jumps at breaks, and the nodes of a graph.
 
     Attributes:
         t_ns: (N,) times of the scans.
