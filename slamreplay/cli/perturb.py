@@ -105,7 +105,7 @@ def perturb(
     from slamreplay.cli.main import cache_folder
     from slamreplay.cli.progress import progress_bar
     from slamreplay.estimators import ESTIMATORS
-    from slamreplay.replay.design import design, parse_perturbation
+    from slamreplay.replay.design import design, parse_perturbation, usual_estimators
     from slamreplay.replay.folder import RUNS, write_runs
     from slamreplay.replay.metrics import trial_metrics
     from slamreplay.replay.runner import replay
@@ -124,7 +124,8 @@ def perturb(
         end_s=end_s,
     )
     with options.evidence(logs, how) as bundle:
-        trials = design(bundle, estimators or list(ESTIMATORS), perturbations or (), seed or 0)
+        names = estimators or usual_estimators(bundle)
+        trials = design(bundle, names, perturbations or (), seed or 0)
         with progress_bar("replaying") as progress:
             runs = replay(bundle, trials, progress=progress, cache=cache_folder() / "runs")
         is_raw = bundle.path is None or bundle.path.resolve() != logs[0].resolve()

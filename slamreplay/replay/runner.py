@@ -78,6 +78,7 @@ def run_trial(bundle: Bundle, trial: Trial) -> Run:
     estimator = ESTIMATORS.load(trial.estimator)()
     view = bundle.view()
     try:
+        _refuse_recorded(trial, estimator)
         if trial.perturbation is not None and trial.level is not None:
             name, _, variant = trial.perturbation.partition(".")
             stream = np.random.SeedSequence([trial.seed, _PERTURBATION_STREAM])
@@ -87,6 +88,12 @@ def run_trial(bundle: Bundle, trial: Trial) -> Run:
         return Run(trial, estimator.run(view, seed=trial.seed))
     except NotApplicableError as reason:
         return Run(trial, None, str(reason))
+
+
+def _refuse_recorded(trial: Trial, estimator: Any) -> None:
+    """What was recorded stays as it was, whatever is done to the evidence."""
+    if trial.perturbation is not None and not getattr(estimator, "reruns", True):
+        raise NotApplicableError("recorded, cannot be run again", where=estimator.name)
 
 
 def _refuse_ignored(view: BundleView, estimator: Any) -> None:
