@@ -1,16 +1,20 @@
 """Registration of points with points: poses that are known, directions that nothing holds."""
 
+import sys
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial import cKDTree
 
+from slamreplay.errors import NotApplicableError
 from slamreplay.geometry import se2
 from slamreplay.maps.grid import OccupancyGrid
 from slamreplay.maps.raycast import cast_rays
 from slamreplay.matching.icp import IcpSettings, _axes, _nearest, icp
 from slamreplay.matching.line_target import line_target
+from slamreplay.matching.open3d_icp import icp_open3d
 from slamreplay.testing.synthetic import room_grid
 
 NOISE_M = 0.01
@@ -137,20 +141,31 @@ def test_lines_are_laid_through_neighbours():
 
     target = line_target(np.concatenate([turned, [[90.0, 90.0]]]))
 
-    assert 480 <= len(target.points) <= 500
+    assert 50 <= len(target.points) <= 150
+    on_line = target.points - target.off[:, None] * target.normals
+    off = se2.transform_points(se2.inverse(np.array([1.0, 2.0, 0.6])), on_line)
+    assert np.abs(off[:, 1]).max() < NOISE_M
     angle = np.arctan2(target.normals[:, 1], target.normals[:, 0]) - 0.6
     angle = np.mod(angle, np.pi) - np.pi / 2.0
     assert np.mean(angle**2 / target.variance) == pytest.approx(1.0, abs=0.6)
 
 
-def test_every_point_stands_in_its_cell():
+def test_every_line_stands_in_its_cell():
     rng = np.random.default_rng(9)
-    target = line_target(rng.normal(0.0, 0.3, (300, 2)) * np.array([1.0, 0.02]))
-    assert target.starts[-1] == len(target.points) > 100
-    at = ((target.points - target.corner_xy) / target.cell_m).astype(int)
-    for cell in range(len(target.starts) - 1):
-        here = at[target.starts[cell] : target.starts[cell + 1]]
-        assert (here[:, 1] * target.columns + here[:, 0] == cell).all()
+    points = rng.normal(0.0, 0.3, (300, 2)) * np.array([1.0, 0.02])
+    target = line_target(points)
+    rows, cols = np.nonzero(target.index >= 0)
+    assert len(rows) == len(target.points) > 10
+    assert sorted(target.index[rows, cols]) == list(range(len(rows)))
+    at = ((points - target.corner_xy) / target.cell_m).astype(int)
+    for row, col in zip(rows, cols, strict=True):
+        k = target.index[row, col]
+        mean = points[(at == [col, row]).all(axis=1)].mean(axis=0)
+        np.testing.assert_allclose(target.points[k], mean, atol=1e-12)
+        near = points[(np.abs(at - [col, row]) <= 1).all(axis=1)]
+        if len(near) >= 6:
+            off = target.normals[k] @ (mean - near.mean(axis=0))
+            assert target.off[k] == pytest.approx(off, abs=1e-12)
 
 
 @given(seed=st.integers(0, 10**6), reach=st.sampled_from([0.05, 0.4, 2.0]))
@@ -162,8 +177,7 @@ def test_the_nearest_point_is_the_nearest(seed, reach):
     frame = (target.cell_m, target.corner_xy[0], target.corner_xy[1])
     for x, y in rng.uniform(-1.5, 1.5, (30, 2)):
         before = int(rng.integers(-1, len(target.points)))
-        cells = (target.points, target.starts, target.columns, frame)
-        found = _nearest(*cells, x, y, reach, before)
+        found = _nearest(target.points, target.index, frame, x, y, reach, before)
         if not len(target.points):
             assert found == -1
             continue
@@ -194,3 +208,30 @@ def test_settings_are_heeded():
 
     assert (one.steps, one.converged) == (1, False)
     assert np.hypot(*(whole.xyyaw - move)[:2]) < 0.006
+
+
+def test_open3d_finds_the_same_place():
+    rng = np.random.default_rng(13)
+    first, move = np.array([3.7, 6.1, 0.7]), np.array([0.1, 0.1, 0.05])
+    target, points = line_target(scan_at(first, rng)), scan_at(se2.compose(first, move), rng)
+    try:
+        theirs = icp_open3d(target, points, np.zeros(3))
+    except NotApplicableError as error:
+        pytest.skip(str(error))
+
+    ours = icp(target, points, np.zeros(3))
+
+    assert theirs.converged
+    assert np.hypot(*(theirs.xyyaw - move)[:2]) < 0.01
+    np.testing.assert_allclose(theirs.information, ours.information, rtol=0.3, atol=2e3)
+    nowhere = icp_open3d(target, np.empty((0, 2)), np.zeros(3))
+    assert not nowhere.converged
+    assert not nowhere.observed.any()
+
+
+def test_open3d_that_is_missing_is_named(monkeypatch):
+    monkeypatch.setitem(sys.modules, "open3d", None)
+    target = line_target(scan_at((3.7, 6.1, 0.7), np.random.default_rng(0)))
+
+    with pytest.raises(NotApplicableError, match="Open3D cannot be loaded"):
+        icp_open3d(target, np.ones((3, 2)), np.zeros(3))

@@ -111,7 +111,7 @@ def icp(
     partner = np.full(len(points), -1, dtype=np.int64)
     room = np.zeros((3, 3))
     _register(
-        (target.points, target.normals, target.variance, target.starts, target.columns),
+        (target.points, target.normals, target.off, target.variance, target.index),
         (target.cell_m, target.corner_xy[0], target.corner_xy[1]),
         points,
         pose,
@@ -136,7 +136,7 @@ def icp(
 
 
 @njit(cache=True, nogil=True)
-def _register(target, frame, points, pose, limits, partner, out, room, tally):  # type: ignore[no-untyped-def]
+def _register(target, frame, points, pose, limits, partner, out, room, tally):  # type: ignore[no-untyped-def]  # noqa: C901
     """Move `pose` to the best fit; write information, directions and what else is told."""
     noise, most, lever = limits[1], int(limits[2]), limits[5]
     width, stride = limits[0] / 2.0, int(limits[3])
@@ -157,8 +157,13 @@ def _register(target, frame, points, pose, limits, partner, out, room, tally):  
                 tally[3] = 1.0
                 break
             stride = 1
-    # At rest: weights, inliers and information of where the pose is.
-    rms = _sum_up(target, frame, points, pose, limits[0], width, 1, lever, partner, out, tally)
+    # Of where the pose is: weights by a width that goes with the fit, whatever it was before.
+    for _ in range(20):
+        rms = _sum_up(target, frame, points, pose, limits[0], width, 1, lever, partner, out, tally)
+        narrow = max(min(width, 2.5 * rms), 2.5 * noise)
+        if narrow > 0.8 * width:
+            break
+        width = narrow
     _axes(out, room, limits[4])
     tally[1] = rms
     variance = max(tally[1], noise) ** 2
@@ -185,7 +190,7 @@ def _sum_up(  # type: ignore[no-untyped-def]
     Returns:
         The inliers' root mean square distance from their lines.
     """
-    cloud, normals, variance, starts, columns = target
+    cloud, normals, offsets, variance, index = target
     cos, sin = np.cos(pose[2]), np.sin(pose[2])
     total = squares = 0.0
     inliers = near = 0
@@ -196,13 +201,13 @@ def _sum_up(  # type: ignore[no-untyped-def]
         u = cos * points[p, 0] - sin * points[p, 1]
         v = sin * points[p, 0] + cos * points[p, 1]
         x, y = pose[0] + u, pose[1] + v
-        q = _nearest(cloud, starts, columns, frame, x, y, reach, partner[p])
+        q = _nearest(cloud, index, frame, x, y, reach, partner[p])
         partner[p] = q
         near += 1
         if q < 0:
             continue
         nx, ny = normals[q, 0], normals[q, 1]
-        off = nx * (x - cloud[q, 0]) + ny * (y - cloud[q, 1])
+        off = nx * (x - cloud[q, 0]) + ny * (y - cloud[q, 1]) + offsets[q]
         ratio = off / width
         weight = np.exp(-0.5 * ratio * ratio)
         if weight > 0.5:
@@ -243,36 +248,36 @@ def _sum_up(  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def _nearest(cloud, starts, columns, frame, x, y, reach, before):  # type: ignore[no-untyped-def]  # noqa: C901
-    """The nearest point of the target within reach, or -1; quickest from where it was `before`."""
+def _nearest(cloud, index, frame, x, y, reach, before):  # type: ignore[no-untyped-def]
+    """The nearest of the target's points within reach, or -1; quickest from where it was `before`.
+
+    Squares of cells about (x, y) are looked through, one ring after another, until all that is
+    left lies beyond the nearest found.
+    """
     cell, x0, y0 = frame
-    rows = (starts.shape[0] - 1) // columns
-    col, row = int(np.floor((x - x0) / cell)), int(np.floor((y - y0) / cell))
-    best, found = reach * reach, -1
+    rows, columns = index.shape
+    u, v = (x - x0) / cell, (y - y0) / cell
+    col, row = int(np.floor(u)), int(np.floor(v))
+    best, found = reach * reach, np.int64(-1)
     if before >= 0:
         dx, dy = cloud[before, 0] - x, cloud[before, 1] - y
         if dx * dx + dy * dy <= best:
             best, found = dx * dx + dy * dy, before
+    # From the point to the nearest edge of its cell: rings begin so much farther than their number.
+    edge = min(u - col, col + 1.0 - u, v - row, row + 1.0 - v)
     ring = 0
-    # Points of a ring lie at least as far away as its inner edge.
-    while ring == 0 or ((ring - 1) * cell) ** 2 <= best:
-        low, high = row - ring, row + ring
+    while ring == 0 or ((ring - 1 + edge) * cell) ** 2 < best:
         left, right = max(col - ring, 0), min(col + ring, columns - 1)
-        for r in range(max(low, 0), min(high, rows - 1) + 1):
-            whole = r in (low, high)
-            if whole:
-                if left <= right:
-                    for q in range(starts[r * columns + left], starts[r * columns + right + 1]):
-                        dx, dy = cloud[q, 0] - x, cloud[q, 1] - y
-                        if dx * dx + dy * dy < best:
-                            best, found = dx * dx + dy * dy, q
-                continue
-            for c in (col - ring, col + ring):
-                if 0 <= c < columns:
-                    for q in range(starts[r * columns + c], starts[r * columns + c + 1]):
-                        dx, dy = cloud[q, 0] - x, cloud[q, 1] - y
-                        if dx * dx + dy * dy < best:
-                            best, found = dx * dx + dy * dy, q
+        for r in range(max(row - ring, 0), min(row + ring, rows - 1) + 1):
+            stride = 1 if r == row - ring or r == row + ring else max(2 * ring, 1)
+            c = left if stride == 1 or left == col - ring else col + ring
+            while 0 <= c <= right:
+                q = np.int64(index[r, c])
+                if q >= 0:
+                    dx, dy = cloud[q, 0] - x, cloud[q, 1] - y
+                    if dx * dx + dy * dy < best:
+                        best, found = dx * dx + dy * dy, q
+                c += stride
         ring += 1
     return found
 

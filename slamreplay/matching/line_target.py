@@ -1,4 +1,4 @@
-"""Points made ready to be registered against: sorted into cells, each with the line it lies on."""
+"""Points made ready to be registered against: short lines, one for each cell that holds points."""
 
 from __future__ import annotations
 
@@ -10,103 +10,121 @@ from numpy.typing import NDArray
 
 from slamreplay.geometry.se2 import Array
 
-#: Edge of a cell, m, and how many cells at most; a farther spread of points gets larger cells.
-CELL_M, MOST_CELLS = 0.1, 1_000_000
-#: A line is laid through the points within the first of these radii that holds enough of them,
-#: unless they are too little of a line: the ratio of their variances across and along.
-_RADII_M = np.array([0.15, 0.3, 0.6, 1.2])
+#: Edge of a cell, m, and how many cells at most; points spread farther get larger cells.
+CELL_M, MOST_CELLS = 0.1, 4_000_000
+#: A line is laid through the points of the first square of cells that holds enough of them, so
+#: many cells to each side, unless they are too little of a line: variance across over along.
+_RINGS = np.array([1, 2, 4, 8])
 _LEAST_POINTS, _ROUND = 6, 0.05
 
 
 @dataclass(frozen=True, eq=False)
 class LineTarget:
-    """N points in one frame, of which each lies on a line: those that lie on none are left out.
+    """N short lines in one frame. Points that lie on no line are left out.
 
     Attributes:
-        points: (N, 2) m, in the order of their cells.
+        points: (N, 2) m, mean of a cell's points.
         normals: (N, 2) unit vectors across the lines, of either sign.
+        off: (N,) m, how far the points lie off their lines, along the normals.
         variance: (N,) rad^2 by which a normal's direction is uncertain.
-        starts: (rows * columns + 1,) first point of each cell, row by row.
+        index: (rows, columns) int32 which line a cell has, -1 for none.
         cell_m: edge of a cell.
         corner_xy: (2,) m, lower left corner of the first cell.
-        columns: of the cells.
     """
 
     points: Array
     normals: Array
+    off: Array
     variance: Array
-    starts: NDArray[np.int64]
+    index: NDArray[np.int32]
     cell_m: float
     corner_xy: Array
-    columns: int
 
 
 def line_target(points: Array) -> LineTarget:
-    """Sort points (N, 2), m, into cells and lay a line through the neighbours of each.
+    """Lay lines through points (N, 2), m, all finite.
 
-    The direction of a line is the principal axis of its points; its variance is that of the slope
-    of a line fitted to them, s^2 / (n v), with s^2 their variance across it and v along it.
+    A line is the principal axis of its points. The variance of its direction is that of the slope
+    of a fitted line, s^2 / (n v), with s^2 the points' variance across it and v along it.
     """
     points = np.ascontiguousarray(points, dtype=np.float64)
-    order, starts, cell, corner, columns = _sorted(points)
-    normals, variance = np.zeros((len(points), 2)), np.zeros(len(points))
-    points = points[order]
-    _lay_lines(points, starts, cell, corner, columns, _RADII_M, normals, variance)
-    on_line = variance > 0.0
-    kept = np.append(0, np.cumsum(on_line))[starts]
-    return LineTarget(
-        points[on_line], normals[on_line], variance[on_line], kept, cell, corner, columns
-    )
-
-
-def _sorted(
-    points: Array,
-) -> tuple[NDArray[np.int64], NDArray[np.int64], float, Array, int]:
-    """Order of the points by cell, starts of the cells, their edge, first corner and columns."""
-    if not len(points):
-        return np.zeros(0, np.int64), np.zeros(2, np.int64), CELL_M, np.zeros(2), 1
-    corner = points.min(axis=0)
-    extent = points.max(axis=0) - corner
+    corner, extent = np.zeros(2), np.zeros(2)
+    if len(points):
+        corner = points.min(axis=0)
+        extent = points.max(axis=0) - corner
     cell = max(CELL_M, float(np.sqrt(np.prod(extent + CELL_M) / MOST_CELLS)), extent.max() * 1e-6)
     columns, rows = ((extent / cell).astype(np.int64) + 1).tolist()
-    at = ((points - corner) / cell).astype(np.int64)
-    number = at[:, 1] * columns + at[:, 0]
-    order = np.argsort(number, kind="stable")
-    starts = np.append(0, np.cumsum(np.bincount(number, minlength=rows * columns)))
-    return order, starts.astype(np.int64), cell, corner, columns
+    index = np.full((rows, columns), -1, dtype=np.int32)
+    sums = np.zeros((len(points), 9))
+    found = np.zeros((len(points), 6))
+    count = _lay_lines(points, index, cell, corner, _RINGS, sums, found)
+    lines = found[:count]
+    points, normals = lines[:, :2].copy(), lines[:, 2:4].copy()
+    off, variance = lines[:, 4].copy(), lines[:, 5].copy()
+    return LineTarget(points, normals, off, variance, index, cell, corner)
 
 
 @njit(cache=True, nogil=True)
-def _lay_lines(points, starts, cell, corner, columns, radii, normals, variance):  # type: ignore[no-untyped-def]
-    """Write the normal of each point's line, and its variance; that stays 0 where there is none."""
-    rows = (starts.shape[0] - 1) // columns
+def _lay_lines(points, index, cell, corner, rings, sums, found):  # type: ignore[no-untyped-def]  # noqa: C901
+    """Write points, normals, offsets and variances of lines into `found`, and `index`; how many.
+
+    `sums` hold, of each cell: column, row, count, sums of x, y, xx, xy, yy about its middle, line.
+    """
+    occupied = 0
     for p in range(points.shape[0]):
-        x, y = points[p, 0], points[p, 1]
-        col, row = int((x - corner[0]) / cell), int((y - corner[1]) / cell)
-        for k in range(radii.shape[0]):
-            ring, limit = int(np.ceil(radii[k] / cell)), radii[k] * radii[k]
-            count, sx, sy, sxx, sxy, syy = 0, 0.0, 0.0, 0.0, 0.0, 0.0
-            left, right = max(col - ring, 0), min(col + ring, columns - 1)
-            for r in range(max(row - ring, 0), min(row + ring, rows - 1) + 1):
-                for q in range(starts[r * columns + left], starts[r * columns + right + 1]):
-                    dx, dy = points[q, 0] - x, points[q, 1] - y
-                    if dx * dx + dy * dy <= limit:
-                        count += 1
-                        sx += dx
-                        sy += dy
-                        sxx += dx * dx
-                        sxy += dx * dy
-                        syy += dy * dy
-            if count < _LEAST_POINTS:
+        u, v = (points[p, 0] - corner[0]) / cell, (points[p, 1] - corner[1]) / cell
+        col, row = int(u), int(v)
+        k = index[row, col]
+        if k < 0:
+            k = occupied
+            index[row, col] = k
+            sums[k, 0], sums[k, 1], sums[k, 8] = col, row, -1.0
+            occupied += 1
+        dx, dy = u - col - 0.5, v - row - 0.5
+        sums[k, 2] += 1.0
+        sums[k, 3] += dx
+        sums[k, 4] += dy
+        sums[k, 5] += dx * dx
+        sums[k, 6] += dx * dy
+        sums[k, 7] += dy * dy
+    lines = 0
+    for k in range(occupied):
+        col, row = int(sums[k, 0]), int(sums[k, 1])
+        for ring in rings:
+            n = sx = sy = sxx = sxy = syy = 0.0
+            left, right = max(col - ring, 0), min(col + ring, index.shape[1] - 1)
+            for r in range(max(row - ring, 0), min(row + ring, index.shape[0] - 1) + 1):
+                for c in range(left, right + 1):
+                    m = index[r, c]
+                    if m < 0:
+                        continue
+                    dx, dy, count = c - col, r - row, sums[m, 2]
+                    n += count
+                    sx += sums[m, 3] + dx * count
+                    sy += sums[m, 4] + dy * count
+                    sxx += sums[m, 5] + dx * (2.0 * sums[m, 3] + dx * count)
+                    sxy += sums[m, 6] + dx * sums[m, 4] + dy * sums[m, 3] + dx * dy * count
+                    syy += sums[m, 7] + dy * (2.0 * sums[m, 4] + dy * count)
+            if n < _LEAST_POINTS:
                 continue
-            mx, my = sx / count, sy / count
-            xx, xy, yy = sxx / count - mx * mx, sxy / count - mx * my, syy / count - my * my
-            half, middle = 0.5 * (xx - yy), 0.5 * (xx + yy)
-            root = np.sqrt(half * half + xy * xy)
-            along, across = middle + root, max(middle - root, 1e-12)
+            mx, my = sx / n, sy / n
+            xx, xy, yy = sxx / n - mx * mx, sxy / n - mx * my, syy / n - my * my
+            root = np.sqrt(0.25 * (xx - yy) * (xx - yy) + xy * xy)
+            along, across = 0.5 * (xx + yy) + root, max(0.5 * (xx + yy) - root, 1e-9)
             if across > _ROUND * along:
                 continue
             angle = 0.5 * np.arctan2(2.0 * xy, xx - yy)
-            normals[p, 0], normals[p, 1] = -np.sin(angle), np.cos(angle)
-            variance[p] = across / (along * count)
+            nx, ny = -np.sin(angle), np.cos(angle)
+            x, y = sums[k, 3] / sums[k, 2], sums[k, 4] / sums[k, 2]
+            found[lines, 0] = corner[0] + (col + 0.5 + x) * cell
+            found[lines, 1] = corner[1] + (row + 0.5 + y) * cell
+            found[lines, 2], found[lines, 3] = nx, ny
+            found[lines, 4] = (nx * (x - mx) + ny * (y - my)) * cell
+            found[lines, 5] = across / (along * n)
+            sums[k, 8] = lines
+            lines += 1
             break
+    # Until here the index held the cells' own numbers, which their neighbours went by.
+    for k in range(occupied):
+        index[int(sums[k, 1]), int(sums[k, 0])] = int(sums[k, 8])
+    return lines
