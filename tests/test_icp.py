@@ -63,8 +63,8 @@ def test_errors_are_as_large_as_the_covariance_says():
         nees.append(error @ found.information @ error)
         np.testing.assert_allclose(found.covariance @ found.information, np.eye(3), atol=1e-6)
 
-    # Partners repeat and normals are shared among neighbours: errors are a little larger.
-    assert 1.5 < np.mean(nees) < 9.0
+    # 3 is expected; without the noise of the target's own lines it is twice that.
+    assert 2.0 < np.mean(nees) < 4.5
 
 
 def test_along_a_corridor_the_guess_stays():

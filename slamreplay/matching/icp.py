@@ -49,8 +49,8 @@ class Registration:
 
     Attributes:
         xyyaw: (3,) pose of the cloud's frame in the target's frame, m and rad.
-        information: (3, 3) of x, y, yaw about the target's axes, with the residuals' own variance;
-            none along directions that are not observed.
+        information: (3, 3) of x, y, yaw about the target's axes, with the residuals' own variance
+            and that of the target's lines; none along directions that are not observed.
         directions: (3, 3) one in each row, unit vectors of x, y and yaw times `lever_m`, from the
             least observed on.
         shares: (3,) of the points' weight that holds each direction, 0 to 1.
@@ -109,9 +109,11 @@ def icp(
     out = np.zeros((4, 3, 3))
     tally = np.zeros(5)
     partner = np.full(len(points), -1, dtype=np.int64)
+    trust = np.ones(len(target.points))
     room = np.zeros((3, 3))
     _register(
-        (target.points, target.normals, target.off, target.variance, target.index),
+        (target.points, target.normals, target.off, target.variance, target.index, trust),
+        target.count,
         (target.cell_m, target.corner_xy[0], target.corner_xy[1]),
         points,
         pose,
@@ -136,7 +138,7 @@ def icp(
 
 
 @njit(cache=True, nogil=True)
-def _register(target, frame, points, pose, limits, partner, out, room, tally):  # type: ignore[no-untyped-def]  # noqa: C901
+def _register(target, count, frame, points, pose, limits, partner, out, room, tally):  # type: ignore[no-untyped-def]  # noqa: C901
     """Move `pose` to the best fit; write information, directions and what else is told."""
     noise, most, lever = limits[1], int(limits[2]), limits[5]
     width, stride = limits[0] / 2.0, int(limits[3])
@@ -164,6 +166,17 @@ def _register(target, frame, points, pose, limits, partner, out, room, tally):  
         if narrow > 0.8 * width:
             break
         width = narrow
+    # A line of n points is off by the noise of their mean, and k pairs with it are so together:
+    # each tells 1 / (1 + k / n) of what it would tell of a line that is known.
+    trust = target[5]
+    for q in range(trust.shape[0]):
+        trust[q] = 0.0
+    for p in range(points.shape[0]):
+        if partner[p] >= 0:
+            trust[partner[p]] += 1.0
+    for q in range(trust.shape[0]):
+        trust[q] = 1.0 / (1.0 + trust[q] / count[q])
+    _sum_up(target, frame, points, pose, limits[0], width, 1, lever, partner, out, tally)
     _axes(out, room, limits[4])
     tally[1] = rms
     variance = max(tally[1], noise) ** 2
@@ -190,7 +203,7 @@ def _sum_up(  # type: ignore[no-untyped-def]
     Returns:
         The inliers' root mean square distance from their lines.
     """
-    cloud, normals, offsets, variance, index = target
+    cloud, normals, offsets, variance, index, trust = target
     cos, sin = np.cos(pose[2]), np.sin(pose[2])
     total = squares = 0.0
     inliers = near = 0
@@ -213,6 +226,7 @@ def _sum_up(  # type: ignore[no-untyped-def]
         if weight > 0.5:
             inliers += 1
             squares += off * off
+        weight *= trust[q]
         turn, slide = (ny * u - nx * v) / lever, (nx * u + ny * v) / lever
         total += weight
         g0 += weight * off * nx

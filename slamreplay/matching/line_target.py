@@ -27,6 +27,7 @@ class LineTarget:
         normals: (N, 2) unit vectors across the lines, of either sign.
         off: (N,) m, how far the points lie off their lines, along the normals.
         variance: (N,) rad^2 by which a normal's direction is uncertain.
+        count: (N,) how many points of the cloud a cell holds.
         index: (rows, columns) int32 which line a cell has, -1 for none.
         cell_m: edge of a cell.
         corner_xy: (2,) m, lower left corner of the first cell.
@@ -36,6 +37,7 @@ class LineTarget:
     normals: Array
     off: Array
     variance: Array
+    count: Array
     index: NDArray[np.int32]
     cell_m: float
     corner_xy: Array
@@ -56,17 +58,16 @@ def line_target(points: Array) -> LineTarget:
     columns, rows = ((extent / cell).astype(np.int64) + 1).tolist()
     index = np.full((rows, columns), -1, dtype=np.int32)
     sums = np.zeros((len(points), 9))
-    found = np.zeros((len(points), 6))
-    count = _lay_lines(points, index, cell, corner, _RINGS, sums, found)
-    lines = found[:count]
+    found = np.zeros((len(points), 7))
+    lines = found[: _lay_lines(points, index, cell, corner, _RINGS, sums, found)]
     points, normals = lines[:, :2].copy(), lines[:, 2:4].copy()
-    off, variance = lines[:, 4].copy(), lines[:, 5].copy()
-    return LineTarget(points, normals, off, variance, index, cell, corner)
+    off, variance, count = (lines[:, k].copy() for k in (4, 5, 6))
+    return LineTarget(points, normals, off, variance, count, index, cell, corner)
 
 
 @njit(cache=True, nogil=True)
 def _lay_lines(points, index, cell, corner, rings, sums, found):  # type: ignore[no-untyped-def]  # noqa: C901
-    """Write points, normals, offsets and variances of lines into `found`, and `index`; how many.
+    """Write what is told of the lines into `found`, and their numbers into `index`; how many.
 
     `sums` hold, of each cell: column, row, count, sums of x, y, xx, xy, yy about its middle, line.
     """
@@ -120,7 +121,7 @@ def _lay_lines(points, index, cell, corner, rings, sums, found):  # type: ignore
             found[lines, 1] = corner[1] + (row + 0.5 + y) * cell
             found[lines, 2], found[lines, 3] = nx, ny
             found[lines, 4] = (nx * (x - mx) + ny * (y - my)) * cell
-            found[lines, 5] = across / (along * n)
+            found[lines, 5], found[lines, 6] = across / (along * n), sums[k, 2]
             sums[k, 8] = lines
             lines += 1
             break
