@@ -4,14 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
 
-import numpy as np
-from numpy.typing import NDArray
-
-from slamreplay.bundle.belief import recorded_belief
+from slamreplay.bundle.belief import belief_times, recorded_belief
 from slamreplay.bundle.findings import SEVERITIES, Finding
 from slamreplay.bundle.odometry import odometry_track
 from slamreplay.bundle.run import Run
-from slamreplay.bundle.view import Bundle, BundleView
+from slamreplay.bundle.view import Bundle
 from slamreplay.consistency.answers import raised
 from slamreplay.consistency.asking import answered
 from slamreplay.consistency.belief.credibility import nees_of_belief
@@ -19,6 +16,7 @@ from slamreplay.consistency.belief.summary import consistency_summaries
 from slamreplay.consistency.context import CheckContext
 from slamreplay.consistency.evidence.references import references_of, unused_references
 from slamreplay.consistency.evidence.sensed import sensed_references
+from slamreplay.estimators import RECORDED
 from slamreplay.hindsight.pipeline import hindsight
 from slamreplay.replay.metrics import trial_metrics
 from slamreplay.report.evidence import Postmortem, TrialResult
@@ -26,7 +24,7 @@ from slamreplay.report.metrics import run_metrics
 from slamreplay.verdict.judge import judge
 from slamreplay.verdict.limits import Limits
 
-__all__ = ["Postmortem", "belief_times", "postmortem"]
+__all__ = ["Postmortem", "postmortem"]
 
 #: Share of the progress bar that hindsight takes: nearly all the time goes there.
 _HINDSIGHT_SHARE = 0.9
@@ -74,8 +72,13 @@ def postmortem(
     findings = [*judgement.findings, *unused_references(bundle, context.updates)]
     findings += sensed_references(bundle, found, hold_out)
     of_runs = [CheckContext.of_run(run, references, view) for run in runs]
-    undisturbed = [c for c, run in zip(of_runs, runs, strict=True) if not run.trial.perturbation]
-    answers = answered([context, *undisturbed])
+    # What the localizer said was asked already, as the robot's own belief.
+    rerun = [
+        asked
+        for asked, run in zip(of_runs, runs, strict=True)
+        if not run.trial.perturbation and run.trial.estimator not in RECORDED
+    ]
+    answers = answered([context, *rerun])
     findings += raised(answers)
     track = None if found is None else found.track
     trials = tuple(
@@ -105,16 +108,6 @@ def postmortem(
         consistency=consistency_summaries(context, answers),
         trials=trials,
     )
-
-
-def belief_times(view: BundleView) -> NDArray[np.int64]:
-    """(N,) sorted times at which the belief is asked for: scans, else odometry, else poses."""
-    for role in ("scan", "odometry", "pose"):
-        table = view.role(role)
-        if table is not None and len(table):
-            return np.sort(table.t_ns)
-    track = odometry_track(view)
-    return np.zeros(0, dtype=np.int64) if track is None else np.sort(track.t_ns)
 
 
 def _worst_first(findings: Sequence[Finding]) -> tuple[Finding, ...]:

@@ -136,20 +136,17 @@ def test_run_reads_back_what_was_written(tmp_path):
     assert back.estimate.scalars == {"recoveries": 2.0}
 
 
-def test_a_run_without_axes_and_scalars_still_reads(tmp_path):
+def test_a_run_of_another_format_is_refused_with_what_to_do(tmp_path):
     track = PoseTrack.without_covariance("map", "base", np.arange(1), np.ones((1, 3)))
-    one = Innovations("s", np.arange(1), np.zeros((1, 1)), np.ones((1, 1, 1)), np.ones(1, bool))
-    run = Run(Trial("id", "amcl", 7), Estimate(track, (one,)))
-    with np.load(io.BytesIO(run_bytes(run))) as arrays:
+    with np.load(io.BytesIO(run_bytes(Run(Trial("id", "amcl", 7), Estimate(track))))) as arrays:
         older = dict(arrays)
-    head = json.loads(older["head"].tobytes())
-    del head["axes"], head["scalars"]
+    head = {**json.loads(older["head"].tobytes()), "run_format": 1}
     older["head"] = np.frombuffer(json.dumps(head).encode(), dtype=np.uint8)
     np.savez(tmp_path / "r.npz", **older)
 
-    back = read_run(tmp_path / "r.npz").estimate
-    assert back.innovations[0].axes == ()
-    assert dict(back.scalars) == {}
+    with pytest.raises(BundleError, match="run format 1, this program reads 2") as refused:
+        read_run(tmp_path / "r.npz")
+    assert refused.value.hint == "run perturb again"
 
 
 def test_ragged_take_repeats_and_reorders():
@@ -168,3 +165,14 @@ def test_unwritable_place_is_refused_before_the_work(tmp_path):
     if os.geteuid() != 0:  # root may write anywhere
         with pytest.raises(OutputError, match="takes no new entries"):
             check_target(tmp_path / "locked" / "b", "manifest.json")
+
+
+def test_a_robot_that_stood_is_where_it_was_however_seldom_it_says_so():
+    """Samples 4 s apart: the first two agree, the next is a metre on; 20 s later nobody knows."""
+    t_ns = np.array([0, 4, 8, 30]) * 1_000_000_000
+    xyyaw = np.array([[1.0, 2.0, 0.1], [1.0, 2.02, 0.1], [2.0, 2.0, 0.1], [2.0, 2.0, 0.1]])
+    track = PoseTrack.without_covariance("odom", "base", t_ns, xyyaw)
+
+    at = track.at(np.array([2, 6, 20]) * 1_000_000_000).xyyaw
+    np.testing.assert_allclose(at[0], [1.0, 2.01, 0.1])
+    assert np.isnan(at[1:]).all()

@@ -16,6 +16,9 @@ ESTIMATOR_LINES = {
     "dead_reckoning": (1e-6, 1e-6),
     "ekf": (1e-6, 1e-6),
     "ekf_tuned": (1e-3, 1e-3),
+    "recorded": (1e-6, 1e-6),
+    "recorded_pose": (1e-6, 1e-6),
+    "recorded_tf": (1e-6, 1e-6),
 }
 
 PERTURBATION_LINES = (

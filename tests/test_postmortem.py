@@ -8,12 +8,13 @@ import jsonschema
 import numpy as np
 import pytest
 
+from slamreplay.bundle.belief import belief_times
 from slamreplay.bundle.run import Estimate, Run, Trial
 from slamreplay.bundle.schema import TABLES
 from slamreplay.bundle.tables import Table
 from slamreplay.bundle.track import PoseTrack
 from slamreplay.bundle.view import Bundle
-from slamreplay.postmortem import belief_times, postmortem
+from slamreplay.postmortem import postmortem
 from slamreplay.report.assess import not_assessable
 from slamreplay.report.build import build
 from slamreplay.report.model import schema_text

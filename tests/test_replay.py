@@ -10,7 +10,7 @@ from slamreplay.bundle.schema import TABLES
 from slamreplay.bundle.store import write_bundle
 from slamreplay.bundle.view import Bundle
 from slamreplay.errors import BundleError, OutputError, UsageError
-from slamreplay.replay import runner
+from slamreplay.replay import parallel, runner
 from slamreplay.replay.design import design, parse_perturbation
 from slamreplay.replay.folder import is_runs, read_runs, write_runs
 from slamreplay.replay.metrics import trial_metrics
@@ -142,7 +142,36 @@ def test_progress_ends_at_one(bundle):
         progress=lambda what, share: told.append((what, share)),
     )
 
-    assert told == [("dead_reckoning, baseline", 0.0), ("replayed", 1.0)]
+    what = "dead_reckoning, baseline"
+    assert told == [(what, 0.0), (what, 1.0), ("replayed", 1.0)]
+
+
+def test_workers_give_the_same_bits_and_leave_runs_in_the_cache(tmp_path):
+    made = synthetic_bundle(seconds=4.0)
+    write_bundle(tmp_path / "b", made.manifest, {n: made.table(n) for n in TABLES}, {})
+    bundle = Bundle.open(tmp_path / "b")
+    trials = design(bundle, ["dead_reckoning"], ["scan_drop=0.5", "tf_delay=0.1"], 3)
+
+    shared = runner.replay(bundle, trials, workers=2, cache=tmp_path / "c")
+    alone = runner.replay(bundle, trials, workers=1)
+    assert [run_bytes(run) for run in shared] == [run_bytes(run) for run in alone]
+    assert len(list((tmp_path / "c").iterdir())) == 3
+    without = runner.replay(bundle, trials, workers=2)
+    assert [run_bytes(run) for run in without] == [run_bytes(run) for run in alone]
+
+
+def test_the_fault_of_a_trial_shows_though_a_worker_met_it(tmp_path, monkeypatch):
+    made = synthetic_bundle(seconds=4.0)
+    write_bundle(tmp_path / "b", made.manifest, {n: made.table(n) for n in TABLES}, {})
+    bundle = Bundle.open(tmp_path / "b")
+    trial = Trial(bundle.manifest.bundle_id, "no_such_estimator", 0)
+
+    with pytest.raises(UsageError, match="no_such_estimator"):
+        runner.replay(bundle, [trial, trial], workers=2)
+
+
+def test_a_short_log_needs_no_workers(bundle):
+    assert parallel.worth_workers(bundle, [Trial("", "a", 0), Trial("", "b", 0)]) == 1
 
 
 def test_runs_read_back_with_their_bundle(bundle, tmp_path):

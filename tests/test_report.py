@@ -20,6 +20,7 @@ from slamreplay.bundle.manifest import Source
 from slamreplay.bundle.products import ChangedRegion, Changes, Hindsight
 from slamreplay.bundle.run import Estimate, Run, Trial
 from slamreplay.bundle.track import PoseTrack
+from slamreplay.bundle.tum import tum
 from slamreplay.consistency.belief.summary import ConsistencySummary, PartSummary
 from slamreplay.consistency.evidence.nees import nees
 from slamreplay.consistency.statistics.distribution import distribution
@@ -35,7 +36,6 @@ from slamreplay.report.innovations import innovations
 from slamreplay.report.junit import junit_xml
 from slamreplay.report.model import SCHEMA_FILE, Report, schema_text
 from slamreplay.report.phrases import bound
-from slamreplay.report.trajectory import tum
 from slamreplay.report.writer import write_report
 from slamreplay.testing.synthetic import START_NS, room_grid, synthetic_bundle, true_path
 from slamreplay.verdict.judgement import Action, FailureMode, Interval, Judgement, Stop

@@ -14,7 +14,7 @@ from slamreplay.bench.incidents import Incident, incident
 from slamreplay.bench.logs import bundle_of
 from slamreplay.bench.schedule import Case
 from slamreplay.bench.truth import Truth, changed_cells
-from slamreplay.bundle.belief import recorded_belief
+from slamreplay.bundle.belief import belief_times, recorded_belief
 from slamreplay.bundle.products import ChangedRegion, Hindsight
 from slamreplay.bundle.scans import scan_set
 from slamreplay.bundle.track import PoseTrack
@@ -24,7 +24,6 @@ from slamreplay.geometry import se2
 from slamreplay.geometry.times import ns
 from slamreplay.hindsight.pipeline import hindsight
 from slamreplay.maps.grid import OccupancyGrid
-from slamreplay.postmortem import belief_times
 from slamreplay.verdict.judge import judge
 from slamreplay.verdict.judgement import Judgement
 from slamreplay.verdict.limits import Limits

@@ -183,7 +183,8 @@ FINDINGS: dict[str, Explanation] = {
         "chi-square interval for the effective number of samples (Bar-Shalom, Li, Kirubarajan "
         "2001, section 5.4.2). Only what the update used is tested; where its gate cut off by NIS, "
         "against the chi-square without what lies beyond. Rejected ones are counted against the "
-        "chance of the gate. Estimators that hand on innovations only, not a recorded localizer.",
+        "chance of the gate. Only of estimators that predict them: a recorded localizer, a matcher "
+        "or a pose graph has no S of its own.",
         "Whether R or Q is to blame it cannot tell: see SR-CON-007. Scaling both by the factor "
         "makes S fit. Where SR-CON-007 is raised too, innovations may be small although the "
         "belief is far too sure of itself. A gate far out of tune lets through what fits it.",

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from slamreplay.bundle.track import PoseTrack
 from slamreplay.errors import BundleError
+from slamreplay.geometry.covariance import is_positive_definite
 from slamreplay.geometry.se2 import Array
 
 RUN_FORMAT = 2
@@ -89,9 +90,9 @@ class Innovations:
 
     @property
     def nis(self) -> Array:
-        """(N,) normalised innovation squared r' S^-1 r; NaN where S is not known."""
+        """(N,) normalised innovation squared r' S^-1 r; NaN where S is no covariance."""
         S, r = np.asarray(self.S), np.asarray(self.residual)
-        known = np.isfinite(S).all(axis=(1, 2)) & np.isfinite(r).all(axis=1)
+        known = is_positive_definite(S) & np.isfinite(r).all(axis=1)
         out = np.full(len(r), np.nan)
         L = np.linalg.cholesky(S[known])
         white = np.linalg.solve(L, r[known, :, None])[..., 0]
@@ -162,7 +163,11 @@ def read_run(path: Path) -> Run:
         with np.load(path, allow_pickle=False) as arrays:
             head = json.loads(arrays["head"].tobytes())
             if head["run_format"] != RUN_FORMAT:
-                raise BundleError(f"run format {head['run_format']}", where=path)
+                raise BundleError(
+                    f"run format {head['run_format']}, this program reads {RUN_FORMAT}",
+                    where=path,
+                    hint="run perturb again",
+                )
             trial = Trial(**head["trial"])
             if "frames" not in head:
                 return Run(trial, None, head["not_applicable"])
@@ -176,7 +181,7 @@ def read_run(path: Path) -> Run:
                 for name in arrays.files
                 if name.startswith("diagnostic.")
             }
-            scalars = {str(k): float(v) for k, v in head.get("scalars", {}).items()}
+            scalars = {str(k): float(v) for k, v in head["scalars"].items()}
     except (OSError, ValueError, LookupError, TypeError, AttributeError) as error:
         raise BundleError("not a readable run", where=path) from error
     estimate = Estimate(track, innovations, diagnostics, scalars)

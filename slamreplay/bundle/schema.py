@@ -278,6 +278,22 @@ _SCHEMAS = (
         _POSE_COV,
     ),
     _table(
+        "relations",
+        "motions between two scans as somebody measured them: they only judge, no estimator "
+        "sees them",
+        _CHILD,
+        Column("t2_sensor_ns", "int64", unit="ns", doc="header stamp of the second scan"),
+        Column(
+            "position_xyz",
+            "float64",
+            3,
+            "m",
+            "child_frame_id",
+            "at the second stamp, from the robot's place at the first",
+        ),
+        Column("orientation_xyzw", "float64", 4, "1", "child_frame_id", "unit quaternion"),
+    ),
+    _table(
         "signals",
         "numbers a localizer says of itself, one row each",
         Column("name", "str", doc="of the number: alpha, reliability, transform_probability"),
@@ -332,3 +348,5 @@ TABLES: dict[str, TableSchema] = {schema.name: schema for schema in _SCHEMAS}
 JUDGING_KINDS = frozenset({"simulation", "motion_capture", "survey"})
 #: References of these kinds the robot sensed itself: they join hindsight unless they are held out.
 SENSED_KINDS = frozenset({"gnss", "fiducial", "dock"})
+#: The table of motions that somebody measured: it only judges as well.
+RELATIONS = "relations"

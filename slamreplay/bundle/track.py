@@ -9,6 +9,10 @@ from numpy.typing import NDArray
 
 from slamreplay.geometry import se2
 
+#: Samples this near to each other tell of a robot that stood, where nothing was published between
+#: them for no longer than this: in more time it could have been away and back.
+STOOD_M, STOOD_RAD, STOOD_NS = 0.05, 0.05, 10_000_000_000
+
 
 @dataclass(frozen=True, eq=False)
 class PoseTrack:
@@ -69,7 +73,8 @@ class PoseTrack:
         Args:
             at_ns: (M,) asked-for times.
             max_gap_ns: a time is answered only between two samples no farther apart than this, or
-                at a sample; elsewhere the pose is NaN: it is never extrapolated.
+                that tell nearly the same pose (a robot that stands publishes seldom), or at a
+                sample; elsewhere the pose is NaN: it is never extrapolated.
         """
         at_ns = np.asarray(at_ns, dtype=np.int64)
         rows = np.flatnonzero(self.has_pose)
@@ -82,9 +87,18 @@ class PoseTrack:
         low = np.clip(np.searchsorted(t, at_ns, side="right") - 1, 0, len(t) - 1)
         high = np.minimum(low + 1, len(t) - 1)
         exact = t[low] == at_ns
-        between = (at_ns > t[low]) & (at_ns <= t[high]) & (t[high] - t[low] <= max_gap_ns)
+        gap = t[high] - t[low]
+        is_near = (gap <= max_gap_ns) | ((gap <= STOOD_NS) & self._stood(rows[low], rows[high]))
+        between = (at_ns > t[low]) & (at_ns <= t[high]) & is_near
         xyyaw = se2.interpolate(t, self.xyyaw[rows], at_ns)
         cov = self.cov[rows[low]]
         outside = ~(exact | between)
         xyyaw[outside], cov[outside] = np.nan, np.nan
         return PoseTrack(self.frame_id, self.child_frame_id, at_ns, xyyaw, cov)
+
+    def _stood(self, low: NDArray[np.int64], high: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """(M,) pairs of rows between which there was no motion that a gap could hide."""
+        off = np.abs(self.xyyaw[high] - self.xyyaw[low])
+        return (np.hypot(off[:, 0], off[:, 1]) <= STOOD_M) & (
+            np.abs(se2.wrap_angle(off[:, 2])) <= STOOD_RAD
+        )

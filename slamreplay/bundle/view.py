@@ -16,7 +16,7 @@ from slamreplay.bundle.manifest import Manifest
 from slamreplay.bundle.map_course import Held, MapStretch, map_course, map_stretches
 from slamreplay.bundle.placeholders import without_placeholders
 from slamreplay.bundle.role_tables import ROLE_TABLES
-from slamreplay.bundle.schema import JUDGING_KINDS, SENSED_KINDS, TABLES
+from slamreplay.bundle.schema import JUDGING_KINDS, RELATIONS, SENSED_KINDS, TABLES
 from slamreplay.bundle.store import read_columns, read_grid, read_manifest, read_table
 from slamreplay.bundle.tables import Table
 from slamreplay.errors import UsageError
@@ -73,11 +73,11 @@ class Bundle:
     def table(self, name: str) -> Table:
         """A table by name as it was recorded, references of every kind included."""
         if name not in self._tables:
-            on_disk = self.path is not None
+            later = self.path is not None and name == RELATIONS and name not in self.manifest.tables
             self._tables[name] = (
-                read_table(self.path, self.manifest, name)
-                if self.path is not None and on_disk
-                else Table.empty(TABLES[name])
+                Table.empty(TABLES[name])  # bundles of before there was such a table lack it
+                if self.path is None or later
+                else read_table(self.path, self.manifest, name)
             )
         return self._tables[name]
 
@@ -171,7 +171,7 @@ class BundleView:
         """A table by name; of references only those the robot itself sensed."""
         if name in self.tables:
             return self.tables[name]
-        if name == "references":
+        if name in ("references", RELATIONS):
             return self.recorded(name)
         return self.bundle.evidence(name)
 
@@ -179,6 +179,8 @@ class BundleView:
         """A table by name with its placeholders, for whoever asks what they are."""
         if name in self.tables:
             return self.tables[name]
+        if name == RELATIONS:
+            return Table.empty(TABLES[name])
         table = self.bundle.table(name)
         if name == "references":
             return table.take(

@@ -20,7 +20,9 @@ from slamreplay.errors import SlamreplayError
 EXIT_INPUT, EXIT_FAULT, EXIT_INTERRUPTED = 2, 70, 130
 
 #: Command modules, in the order of the help; each has `register(app)` and imports nothing heavy.
-COMMANDS = ("report", "ingest", "inspect", "perturb", "simulate", "bench", "explain", "list_")
+COMMANDS = (
+    "report", "ingest", "inspect", "perturb", "export", "simulate", "bench", "explain", "list_",
+)  # fmt: skip
 
 #: What every usage error is: typer carries a click of its own, so it is asked for its base class.
 _UsageFault: type[Any] = typer.BadParameter.__mro__[2]

@@ -38,7 +38,11 @@ Robot = Annotated[
 ]
 Reference = Annotated[
     Path | None,
-    typer.Option("--reference", metavar="FILE", help="Reference poses as TUM or CSV: they judge."),
+    typer.Option(
+        "--reference",
+        metavar="FILE",
+        help="Reference poses as TUM or CSV, or .relations: they judge.",
+    ),
 ]
 Start = Annotated[
     float | None,

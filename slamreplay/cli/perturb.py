@@ -51,6 +51,10 @@ _COLUMNS = (
     ("max [rad]", "baseline_max_rad"),
     ("rmse to ref. [m]", "reference_rmse_m"),
 )
+_RELATIONS = (("relations [m]", "relations_m"), ("relations [rad]", "relations_rad"))
+
+
+_FINE = {key for _, key in _RELATIONS}
 
 
 def register(app: typer.Typer) -> None:
@@ -101,7 +105,7 @@ def perturb(
     from slamreplay.cli.main import cache_folder
     from slamreplay.cli.progress import progress_bar
     from slamreplay.estimators import ESTIMATORS
-    from slamreplay.replay.design import design, parse_perturbation
+    from slamreplay.replay.design import design, parse_perturbation, usual_estimators
     from slamreplay.replay.folder import RUNS, write_runs
     from slamreplay.replay.metrics import trial_metrics
     from slamreplay.replay.runner import replay
@@ -120,7 +124,8 @@ def perturb(
         end_s=end_s,
     )
     with options.evidence(logs, how) as bundle:
-        trials = design(bundle, estimators or list(ESTIMATORS), perturbations or (), seed or 0)
+        names = estimators or usual_estimators(bundle)
+        trials = design(bundle, names, perturbations or (), seed or 0)
         with progress_bar("replaying") as progress:
             runs = replay(bundle, trials, progress=progress, cache=cache_folder() / "runs")
         is_raw = bundle.path is None or bundle.path.resolve() != logs[0].resolve()
@@ -148,14 +153,16 @@ def perturb(
 def _text(rows: list[dict[str, Any]]) -> str:
     """The trials as a table: every estimator's baseline, and below it what changes from it."""
     order = list(dict.fromkeys(str(row["estimator"]) for row in rows))
-    lines = [["estimator", "perturbation", "level", *(title for title, _ in _COLUMNS)]]
+    has_relations = any(row["metrics"]["relations_n"] for row in rows)
+    columns = (*_COLUMNS, *_RELATIONS) if has_relations else _COLUMNS
+    lines = [["estimator", "perturbation", "level", *(title for title, _ in columns)]]
     for row in sorted(rows, key=lambda row: order.index(str(row["estimator"]))):
         level = "" if row["level"] is None else f"{row['level']:g} {row['unit']}"
         line = [str(row["estimator"]), str(row["perturbation"] or "(baseline)"), level]
         if row["not_applicable"]:
             line.append(f"not applicable: {row['not_applicable']}")
         else:
-            line += [_number(row["metrics"], key) for _, key in _COLUMNS]
+            line += [_number(row["metrics"], key) for _, key in columns]
         lines.append(line)
     full = [line for line in lines if len(line) == len(lines[0])]
     widths = [max(len(line[k]) for line in full) for k in range(len(lines[0]))]
@@ -171,4 +178,4 @@ def _text(rows: list[dict[str, Any]]) -> str:
 
 def _number(metrics: Metrics, key: str) -> str:
     value = metrics[key]
-    return "-" if value is None else f"{value:.3f}"
+    return "-" if value is None else f"{value:.4f}" if key in _FINE else f"{value:.3f}"

@@ -9,5 +9,11 @@ ESTIMATORS = Registry(
         "dead_reckoning": "slamreplay.estimators.dead_reckoning:DeadReckoning",
         "ekf": "slamreplay.estimators.ekf.estimator:Ekf",
         "ekf_tuned": "slamreplay.estimators.ekf.estimator:EkfTuned",
+        "recorded": "slamreplay.estimators.recorded:Recorded",
+        "recorded_pose": "slamreplay.estimators.recorded:RecordedPose",
+        "recorded_tf": "slamreplay.estimators.recorded:RecordedTf",
     },
 )
+
+#: What the log's own localizer said: never run again, and judged already as the robot's belief.
+RECORDED = ("recorded", "recorded_pose", "recorded_tf")

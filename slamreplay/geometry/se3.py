@@ -106,6 +106,21 @@ def quaternion_from_yaw(yaw: ArrayLike) -> Array:
     return np.stack([zero, zero, np.sin(half), np.cos(half)], axis=-1)
 
 
+def quaternion_from_rpy(roll: ArrayLike, pitch: ArrayLike, yaw: ArrayLike) -> Array:
+    """(..., 4) x y z w of turns about the parent's x, then y, then z axis (REP-103), rad."""
+    halves = [np.asarray(angle, dtype=np.float64) / 2.0 for angle in (roll, pitch, yaw)]
+    (cr, cp, cy), (sr, sp, sy) = [np.cos(h) for h in halves], [np.sin(h) for h in halves]
+    return np.stack(
+        [
+            sr * cp * cy - cr * sp * sy,
+            cr * sp * cy + sr * cp * sy,
+            cr * cp * sy - sr * sp * cy,
+            cr * cp * cy + sr * sp * sy,
+        ],
+        axis=-1,
+    )
+
+
 def yawed(quaternion_xyzw: ArrayLike, yaw: float) -> Array:
     """Quaternions (N, 4) after a turn by `yaw` rad about the parent's z axis: q_yaw q."""
     x, y, z, w = np.asarray(quaternion_xyzw, dtype=np.float64).T

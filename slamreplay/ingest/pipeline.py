@@ -14,6 +14,8 @@ from slamreplay.bundle.schema import TABLES
 from slamreplay.bundle.store import MANIFEST, write_bundle
 from slamreplay.bundle.tables import Table
 from slamreplay.bundle.view import Bundle
+from slamreplay.errors import UsageError
+from slamreplay.geometry.times import Times
 from slamreplay.ingest.assembly import Assembly
 from slamreplay.ingest.cast import Cast, settle_cast
 from slamreplay.ingest.clock import choose_clock
@@ -31,6 +33,8 @@ from slamreplay.ingest.placed_reference import placed_reference
 from slamreplay.ingest.readers.open_log import open_log
 from slamreplay.ingest.reading import read_rows
 from slamreplay.ingest.reference_file import read_reference
+from slamreplay.ingest.relations_file import SUFFIX as RELATIONS_SUFFIX
+from slamreplay.ingest.relations_file import read_relations
 from slamreplay.ingest.repeats import REPEATS, without_repeats
 from slamreplay.ingest.robots import in_its_frames, refuse_mixture, topic_filter
 from slamreplay.ingest.roles import Choice
@@ -93,11 +97,12 @@ def _ingest(
         timed.append((topic, t_ns))
         losses += [] if is_told_in_log(topic) else remarks  # its lines are told of already
     if options.reference is not None:
-        survey, source, remarks = _survey(options.reference, cast.frames)
-        timed.append((survey, survey.t_sensor_ns))
+        survey, at_ns, remarks = _survey(options.reference, cast.frames, layers.choices, timed)
+        timed.append((survey, at_ns))
         losses += remarks
-        sources.append(source)
-        layers.choices["reference"] = Choice(survey, "given with --reference")
+        sources.append(_source(options.reference))
+        if survey.table == "references":
+            layers.choices["reference"] = Choice(survey, "given with --reference")
 
     tables = build(timed)
     span = evidence_span(tables, cast.frames, logs[0], losses)
@@ -174,12 +179,27 @@ def _of_robot(topics: Sequence[TopicRows], robot: str | None) -> tuple[list[Topi
     return found, losses
 
 
-def _survey(path: Path, frames: Frames) -> tuple[TopicRows, Source, list[Loss]]:
-    rows, losses = read_reference(path, frames.map or "map", frames.base or "base_link")
+def _survey(
+    path: Path,
+    frames: Frames,
+    choices: Mapping[str, Choice],
+    timed: Sequence[tuple[TopicRows, Times]],
+) -> tuple[TopicRows, Times, list[Loss]]:
+    base = frames.base or "base_link"
+    if path.suffix != RELATIONS_SUFFIX:
+        rows, losses = read_reference(path, frames.map or "map", base)
+        return rows, rows.t_sensor_ns, losses
+    scans = choices.get("scan")
+    if scans is None:
+        raise UsageError("relations are between scans, and the log has none", where=path)
+    topic, t_ns = next((rows, t) for rows, t in timed if rows.topic == scans.rows.topic)
+    return read_relations(path, base, topic.t_sensor_ns, t_ns)
+
+
+def _source(path: Path) -> Source:
     content = path.read_bytes()
     digest = hashlib.sha256(content).hexdigest()
-    source = Source(name=path.name, format="reference", bytes=len(content), sha256=digest)
-    return rows, source, losses
+    return Source(name=path.name, format="reference", bytes=len(content), sha256=digest)
 
 
 def _held(

@@ -7,9 +7,16 @@ from collections.abc import Sequence
 from slamreplay.bundle.run import Trial
 from slamreplay.bundle.view import Bundle
 from slamreplay.errors import UsageError
-from slamreplay.estimators import ESTIMATORS
+from slamreplay.estimators import ESTIMATORS, RECORDED
+from slamreplay.estimators.recorded import recorded_names
 from slamreplay.perturb import PERTURBATIONS
 from slamreplay.perturb.variant import check_level
+
+
+def usual_estimators(bundle: Bundle) -> list[str]:
+    """Those that are run where nobody names any: all, and the recorded one where there is one."""
+    there = recorded_names(bundle.view())
+    return [name for name in ESTIMATORS if name not in RECORDED or name in there]
 
 
 def design(

@@ -12,6 +12,7 @@ from slamreplay.bundle.track import PoseTrack
 from slamreplay.bundle.view import Bundle
 from slamreplay.geometry import se2, se3
 from slamreplay.geometry.covariance import planar_from_ros
+from slamreplay.replay.relations import relation_metrics
 
 Metrics = dict[str, float | None]
 
@@ -31,7 +32,7 @@ def trial_metrics(run: Run, runs: Sequence[Run], bundle: Bundle) -> Metrics:
     `rows` and `rows_with_pose`; `baseline_median_m`, `baseline_max_m`, `baseline_final_m` and
     `baseline_max_rad`: distance to the baseline at the same times; `reference_rmse_m`,
     `reference_max_m`, `reference_max_rad`: distance to a judging reference in the same frame,
-    nothing aligned.
+    nothing aligned; `relations_*` as in `replay.relations`.
     """
     track = None if run.estimate is None else run.estimate.track
     baseline = baseline_of(run, runs)
@@ -50,6 +51,7 @@ def trial_metrics(run: Run, runs: Sequence[Run], bundle: Bundle) -> Metrics:
         "reference_rmse_m": float(np.sqrt(np.mean(error**2))) if len(error) else None,
         "reference_max_m": float(error.max()) if len(error) else None,
         "reference_max_rad": float(np.abs(to_reference[:, 2]).max()) if len(error) else None,
+        **relation_metrics(track, bundle),
     }
 
 

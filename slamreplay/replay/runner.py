@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import inspect
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict
 from functools import cache as once
 from pathlib import Path
@@ -20,6 +20,7 @@ from slamreplay.bundle.view import Bundle, BundleView
 from slamreplay.errors import BundleError, NotApplicableError, OutputError, UsageError
 from slamreplay.estimators import ESTIMATORS
 from slamreplay.perturb import PERTURBATIONS
+from slamreplay.replay.parallel import run_each, worth_workers
 
 #: Random numbers of the perturbation do not depend on how many the estimator draws.
 _PERTURBATION_STREAM = 1
@@ -33,6 +34,7 @@ def replay(
     *,
     progress: Callable[[str, float], None] | None = None,
     cache: Path | None = None,
+    workers: int | None = None,
 ) -> list[Run]:
     """A run for each trial, in their order.
 
@@ -44,20 +46,31 @@ def replay(
         trials: of this bundle.
         progress: told what is being done, and the share done.
         cache: folder of earlier runs; one that cannot be written is not used.
+        workers: processes that share the trials, one per core by default; a short log and a bundle
+            that is not on disk are done in this one. Runs are the same bit by bit.
 
     Raises:
         UsageError: a trial is of another bundle, or names what does not exist.
     """
-    runs = []
-    for done, trial in enumerate(trials):
+    for trial in trials:
         if trial.bundle_id != bundle.manifest.bundle_id:
             raise UsageError(f"trial {trial.id} is of another bundle", where=trial.bundle_id)
-        if progress is not None:
-            progress(_words(trial), done / len(trials))
-        runs.append(_cached(bundle, trial, cache))
-    if progress is not None:
-        progress("replayed", 1.0)
-    return runs
+    cache = None if bundle.path is None else cache
+    known = {trial: _from_cache(trial, cache) for trial in trials}
+    runs = {trial: run for trial, run in known.items() if run is not None}
+    pending = [trial for trial in dict.fromkeys(trials) if trial not in runs]
+    workers = worth_workers(bundle, pending) if workers is None else workers
+    found: Iterable[tuple[Trial, Run | None]] = ((trial, None) for trial in pending)
+    if workers > 1 and bundle.path is not None:
+        found = run_each(bundle.path, pending, cache, workers)
+    tell = progress or (lambda words, share: None)  # noqa: ARG005 - nobody listens
+    if pending:
+        tell(_words(pending[0]), len(runs) / len(trials))
+    for trial, run in found:  # what no worker did is done here, where its fault shows
+        runs[trial] = into_cache(bundle, trial, cache) if run is None else run
+        tell(_words(trial), len(runs) / len(trials))
+    tell("replayed", 1.0)
+    return [runs[trial] for trial in trials]
 
 
 def run_trial(bundle: Bundle, trial: Trial) -> Run:
@@ -65,6 +78,7 @@ def run_trial(bundle: Bundle, trial: Trial) -> Run:
     estimator = ESTIMATORS.load(trial.estimator)()
     view = bundle.view()
     try:
+        _refuse_recorded(trial, estimator)
         if trial.perturbation is not None and trial.level is not None:
             name, _, variant = trial.perturbation.partition(".")
             stream = np.random.SeedSequence([trial.seed, _PERTURBATION_STREAM])
@@ -76,6 +90,12 @@ def run_trial(bundle: Bundle, trial: Trial) -> Run:
         return Run(trial, None, str(reason))
 
 
+def _refuse_recorded(trial: Trial, estimator: Any) -> None:
+    """What was recorded stays as it was, whatever is done to the evidence."""
+    if trial.perturbation is not None and not getattr(estimator, "reruns", True):
+        raise NotApplicableError("recorded, cannot be run again", where=estimator.name)
+
+
 def _refuse_ignored(view: BundleView, estimator: Any) -> None:
     """A setting that is not honoured would pass the baseline off as a trial."""
     ignored = sorted(set(view.settings) - estimator.settings)
@@ -83,21 +103,29 @@ def _refuse_ignored(view: BundleView, estimator: Any) -> None:
         raise NotApplicableError(f"has no setting {', '.join(ignored)}", where=estimator.name)
 
 
-def _cached(bundle: Bundle, trial: Trial, cache: Path | None) -> Run:
-    if cache is None or bundle.path is None:
-        return run_trial(bundle, trial)
-    file = cache / f"{_key(trial)}.npz"
-    if file.is_file():
-        try:
-            return read_run(file)
-        except BundleError:
-            pass  # damaged, or of an older version: computed again and replaced
-    run = run_trial(bundle, trial)
+def run_file(trial: Trial, cache: Path) -> Path:
+    """Where a cache keeps the run of a trial."""
+    return cache / f"{_key(trial)}.npz"
+
+
+def _from_cache(trial: Trial, cache: Path | None) -> Run | None:
+    if cache is None or not run_file(trial, cache).is_file():
+        return None
     try:
-        cache.mkdir(parents=True, exist_ok=True)
-        write_file(file, run_bytes(run))
-    except (OSError, OutputError):
-        pass  # a cache that cannot be written costs time, nothing else
+        return read_run(run_file(trial, cache))
+    except BundleError:
+        return None  # damaged, or of an older version: computed again and replaced
+
+
+def into_cache(bundle: Bundle, trial: Trial, cache: Path | None) -> Run:
+    """One run, computed afresh and kept in a folder, where that can be written."""
+    run = run_trial(bundle, trial)
+    if cache is not None:
+        try:
+            cache.mkdir(parents=True, exist_ok=True)
+            write_file(run_file(trial, cache), run_bytes(run))
+        except (OSError, OutputError):
+            pass  # a cache that cannot be written costs time, nothing else
     return run
 
 

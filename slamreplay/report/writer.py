@@ -5,13 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 
 from slamreplay.bundle.atomic import atomic_folder
+from slamreplay.bundle.tum import tum
 from slamreplay.report.build import TRAJECTORY_FILE, build
 from slamreplay.report.changed_map import changed_files
 from slamreplay.report.evidence import Postmortem
 from slamreplay.report.freshness_file import FRESHNESS_FILE, freshness_bytes
 from slamreplay.report.html import html
 from slamreplay.report.junit import junit_xml
-from slamreplay.report.trajectory import tum
 
 MARKER = "report.json"
 

@@ -101,7 +101,7 @@ def cut(bundle: Bundle, after_ns: int) -> Bundle:
 
 
 def without(bundle: Bundle, part: str) -> Bundle:
-    """The bundle without its scans, odometry (on tf too), sightings or map."""
+    """The bundle without its scans, odometry (on tf too), sightings, localizer or map."""
     if part == "map":
         return rebuilt(bundle, {}, None)
     if part == "scans":
@@ -110,8 +110,13 @@ def without(bundle: Bundle, part: str) -> Bundle:
         references = bundle.table("references")
         sensed = np.isin(references["kind"].astype(str), SIGHTED_KINDS)
         return rebuilt(bundle, {"references": references.take(~sensed)})
-    transforms = bundle.table("transforms")
-    keep = transforms["child_frame"] != bundle.manifest.frames.base
+    transforms, frames = bundle.table("transforms"), bundle.manifest.frames
+    if part == "localizer":
+        pairs = zip(transforms["parent_frame"], transforms["child_frame"], strict=True)
+        spoken = np.array([{*pair} == {frames.map, frames.odom} for pair in pairs], dtype=bool)
+        silent = {"transforms": transforms.take(~spoken), "poses": Table.empty(TABLES["poses"])}
+        return rebuilt(bundle, silent)
+    keep = transforms["child_frame"] != frames.base
     tables = {"transforms": transforms.take(keep)}
     return rebuilt(bundle, {**tables, "odometry": Table.empty(TABLES["odometry"])})
 

@@ -21,7 +21,7 @@ from slamreplay.testing import edits
 from slamreplay.testing.conformance import demand, demand_frozen_dataclass, untouched_global_rng
 from slamreplay.testing.synthetic import synthetic_bundle
 
-PARTS = ("odometry", "scans", "map", "sightings")
+PARTS = ("odometry", "scans", "map", "sightings", "localizer")
 #: What settings are changed to: the baseline of no offset (0), switch (0) or ratio (1).
 CHANGED = 2.0
 #: How the world is moved: nothing in it is round, straight or central.

@@ -75,8 +75,8 @@ class InnovationSet:
 
 
 def innovation_sets(innovations: Sequence[Innovations]) -> tuple[InnovationSet, ...]:
-    """Each source's; one without any row is left out."""
-    return tuple(_set(one) for one in innovations if len(one.t_ns))
+    """Each source's; one without any row is left out, and one whose S nothing predicted."""
+    return tuple(_set(one) for one in innovations if len(one.t_ns) and one.is_predicted)
 
 
 def _set(given: Innovations) -> InnovationSet:

@@ -1,0 +1,1 @@
+"""What slamreplay found, in the formats of other tools."""

@@ -1,0 +1,106 @@
+"""`slamreplay export --to tum`: every scan a line, in the order and with the stamps of the log."""
+
+import json
+
+import numpy as np
+import pytest
+import typer
+from evo.tools import file_interface
+from typer.testing import CliRunner
+
+from slamreplay.bundle.run import Estimate, Run, Trial
+from slamreplay.bundle.schema import TABLES
+from slamreplay.bundle.store import write_bundle
+from slamreplay.bundle.track import PoseTrack
+from slamreplay.cli import export, perturb
+from slamreplay.errors import OutputError, UsageError
+from slamreplay.export.tum import bundle_as_tum, runs_as_tum, trial_name
+from slamreplay.testing.synthetic import synthetic_bundle
+
+
+@pytest.fixture
+def bundle(tmp_path):
+    made = synthetic_bundle(seconds=3.0)
+    write_bundle(tmp_path / "b", made.manifest, {n: made.table(n) for n in TABLES}, {})
+    return tmp_path / "b"
+
+
+def call(*arguments: object, catch_exceptions=True):
+    app = typer.Typer()
+    app.callback()(lambda: None)
+    export.register(app)
+    perturb.register(app)
+    return CliRunner().invoke(app, [*map(str, arguments)], catch_exceptions=catch_exceptions)
+
+
+def backward_stamps():
+    """A bundle whose scans are stamped 50 us apart, out of order, and a run over them."""
+    made = synthetic_bundle(seconds=1.0)
+    scans = made.table("scans")
+    stamp = scans["t_sensor_ns"].copy()
+    stamp[[3, 4]] = stamp[[4, 3]] + 123
+    scans = scans.replace(t_sensor_ns=stamp)
+    made = type(made)(made.manifest, {**made._tables, "scans": scans}, {})
+    xyyaw = np.arange(30.0).reshape(10, 3) / 10
+    xyyaw[0] = np.nan
+    track = PoseTrack.without_covariance("map", "base_link", scans.t_ns, xyyaw)
+    return made, stamp, Run(Trial("id", "amcl", 0), Estimate(track))
+
+
+def test_nothing_is_dropped_sorted_or_passed_through_a_float():
+    bundle, stamp, run = backward_stamps()
+    content = runs_as_tum(bundle, [run])
+
+    assert list(content) == ["amcl.tum"]
+    lines = [line.split() for line in content["amcl.tum"].splitlines()]
+    assert [int(line[0].replace(".", "")) for line in lines] == stamp.tolist()
+    assert lines[0][1] == "nan"
+    assert [float(v) for v in lines[1][1:3]] == [0.3, 0.4]
+    assert 2 * np.arcsin(float(lines[1][6])) == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize(
+    ("trial", "with_seed", "name"),
+    [
+        (Trial("", "amcl", 3), False, "amcl"),
+        (Trial("", "amcl", 3), True, "amcl-s3"),
+        (Trial("", "amcl", 3, "scan_drop.random", 0.25), True, "amcl-scan_drop-0.25-s3"),
+        (Trial("", "ekf", 0, "initial_pose.rotate", 90.0), False, "ekf-initial_pose.rotate-90"),
+    ],
+)
+def test_files_are_named_by_their_trial(trial, with_seed, name):
+    assert trial_name(trial, with_seed=with_seed) == name
+
+
+def test_a_run_without_estimate_has_no_file_and_none_at_all_is_said():
+    bundle, _, _ = backward_stamps()
+    with pytest.raises(UsageError, match="no run has an estimate"):
+        runs_as_tum(bundle, [Run(Trial("id", "amcl", 0), None, "no map")])
+
+
+def test_a_bundle_gives_belief_odometry_and_references():
+    content = bundle_as_tum(synthetic_bundle(seconds=3.0, with_tags=True))
+    assert sorted(content) == ["belief.tum", "odometry.tum", "reference-truth.tum"]
+
+
+def test_evo_reads_what_the_command_writes(bundle, tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    call("perturb", bundle, "-e", "dead_reckoning", "-p", "scan_drop=0.5", "-o", tmp_path / "R")
+    ran = call("export", tmp_path / "R", "--to", "tum", "-o", tmp_path / "T", "--json")
+
+    assert json.loads(ran.stdout)["files"] == [
+        "dead_reckoning-scan_drop-0.5.tum",
+        "dead_reckoning.tum",
+    ]
+    trajectory = file_interface.read_tum_trajectory_file(tmp_path / "T" / "dead_reckoning.tum")
+    assert trajectory.num_poses == 30
+    again = call("export", tmp_path / "R", "--to", "tum", "-o", tmp_path / "T")
+    assert again.exit_code == 0, again.output
+
+
+def test_a_folder_of_somebody_else_stays(bundle, tmp_path):
+    (tmp_path / "D").mkdir()
+    (tmp_path / "D" / "x").write_text("mine")
+    ran = call("export", bundle, "--to", "tum", "-o", tmp_path / "D")
+    assert isinstance(ran.exception, OutputError)
+    assert [p.name for p in (tmp_path / "D").iterdir()] == ["x"]
