@@ -9,12 +9,31 @@ from dataclasses import dataclass
 class MatchConfig:
     """Hyper-parameters of local scan matching, one set for all logs.
 
+    What odometry misses is told per root of a metre or a radian, for its variance grows with the
+    way; how much of it there is on a log is learned from the matches on the go.
+
     Attributes:
         node_m: a scan becomes a node after so much motion, m.
         node_rad: or after so much turning, rad.
-        memory: how many nodes back the local map reaches.
+        memory: lines that none of so many nodes have seen are forgotten.
+        sigma_m: a point's standard deviation about its line, m.
+        points_per_fact: so many points tell as much as one whose error is its own.
+        position_per_metre: what odometry misses of the position, m after 1 m.
+        position_per_turn: m after turning by 1 rad.
+        heading_per_metre: and of the heading, rad after 1 m.
+        heading_per_turn: rad after turning by 1 rad.
+        poor: a match is doubted that scores less than this share of what matches do there.
+        lost_scans: after so many scans that match nothing a new map is begun.
     """
 
     node_m: float = 0.2
     node_rad: float = 0.2
-    memory: int = 15
+    memory: int = 30
+    sigma_m: float = 0.02
+    points_per_fact: float = 4.0
+    position_per_metre: float = 0.05
+    position_per_turn: float = 0.03
+    heading_per_metre: float = 0.03
+    heading_per_turn: float = 0.05
+    poor: float = 0.7
+    lost_scans: int = 5

@@ -1,0 +1,43 @@
+"""A match that is doubted is looked for again, in wider and wider windows."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from slamreplay.geometry import se2
+from slamreplay.matching.correlative import Window, search_window
+from slamreplay.matching.field import ScoreField, points_field
+from slamreplay.matching.line_map import LineMap
+
+#: Width of the score around what the map holds, and how far from the robot it is taken from.
+SIGMA_M, RADIUS_M = 0.1, 20.0
+WINDOWS = (
+    Window(0.3, 0.1, np.radians(15.0), np.radians(2.0), pull=0.03),
+    Window(1.2, 0.1, np.radians(30.0), np.radians(2.0), pull=0.03),
+)
+AROUND = Window(0.6, 0.1, np.pi, np.radians(3.0), pull=0.03)
+#: So many points are enough to search with.
+MOST_POINTS = 100
+
+
+def search_field(local_map: LineMap, centre: se2.Array) -> ScoreField | None:
+    """The score around what the map holds near `centre` (3,), or None where that is nothing."""
+    points = local_map.points()
+    near = (np.abs(points - centre[:2]) < RADIUS_M).all(axis=1)
+    return points_field(points[near], SIGMA_M) if near.any() else None
+
+
+def places(
+    field: ScoreField, points: se2.Array, expected: se2.Array, last: se2.Array
+) -> list[se2.Array]:
+    """Where a scan might lie, the nearest window first.
+
+    Args:
+        field: around the map.
+        points: (P, 2) of the scan.
+        expected: (3,) pose by odometry.
+        last: (3,) pose of the scan before, which a robot that is turned by hand stays near.
+    """
+    some = points[:: -(-len(points) // MOST_POINTS)]
+    found = [search_window(field, some, expected, window)[0] for window in WINDOWS]
+    return [*found, search_window(field, some, last, AROUND)[0]]
