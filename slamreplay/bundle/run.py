@@ -108,7 +108,11 @@ class Innovations:
     @property
     def nis(self) -> Array:
         """(N,) normalised innovation squared r' S^-1 r; NaN where S is no covariance."""
-        S, r = np.asarray(self.S), np.asarray(self.residual)
+        return self.nis_of(slice(None))
+
+    def nis_of(self, rows: NDArray[np.int64] | slice) -> Array:
+        """The same of some rows alone."""
+        S, r = np.asarray(self.S)[rows], np.asarray(self.residual)[rows]
         known = is_positive_definite(S) & np.isfinite(r).all(axis=1)
         out = np.full(len(r), np.nan)
         L = np.linalg.cholesky(S[known])
