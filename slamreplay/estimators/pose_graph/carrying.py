@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from slamreplay.estimators.pose_graph.beginning import Beginning
 from slamreplay.estimators.pose_graph.closing import Closed
 from slamreplay.estimators.pose_graph.submaps import Submaps, chain_covariances
 from slamreplay.estimators.scan_matching.local import LocalTrajectory
@@ -35,7 +36,7 @@ def carried_covariances(local: LocalTrajectory, poses: se2.Array, cov: se2.Array
 
 
 def as_driven(
-    local: LocalTrajectory, maps: Submaps, closed: Closed, first: se2.Array, first_cov: se2.Array
+    local: LocalTrajectory, maps: Submaps, closed: Closed, start: Beginning
 ) -> tuple[se2.Array, se2.Array]:
     """What was believed at every scan, when nothing after it was known: poses and covariances.
 
@@ -46,8 +47,7 @@ def as_driven(
         local: every scan in the local frame.
         maps: the submaps.
         closed: where each was believed to be when it was done; with covariances.
-        first: (3,) pose of the first node.
-        first_cov: (3, 3) of it.
+        start: pose of the first node.
     """
     nodes = local.node_xyyaw
     done = local.nodes[np.minimum(maps.stops[1:], len(nodes) - 1)]
@@ -55,8 +55,8 @@ def as_driven(
     rows = np.flatnonzero(local.node_of >= 0)
     which = np.searchsorted(done, rows, side="right") - 1
     on = np.where(which >= 0, maps.reference[which], 0)
-    poses = np.where(which[:, None] >= 0, closed.belief[which], first)
-    start_cov = np.where(which[:, None, None] >= 0, closed.belief_cov[which], first_cov)
+    poses = np.where(which[:, None] >= 0, closed.belief[which], start.xyyaw)
+    start_cov = np.where(which[:, None, None] >= 0, closed.belief_cov[which], start.cov)
     xyyaw = np.full_like(local.xyyaw, np.nan)
     cov = np.full((len(xyyaw), 3, 3), np.nan)
     xyyaw[rows] = se2.compose(poses, se2.between(nodes[on], local.xyyaw[rows]))

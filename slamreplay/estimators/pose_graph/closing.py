@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slamreplay.estimators.pose_graph.config import GraphConfig
-from slamreplay.estimators.pose_graph.placing import Searcher
+from slamreplay.estimators.pose_graph.placing import Searcher, information_of
 from slamreplay.estimators.pose_graph.submaps import Submaps
 from slamreplay.geometry import se2
 from slamreplay.geometry.covariance import composed, turned
@@ -25,8 +25,6 @@ SIGMAS, MARGIN_M, MARGIN_RAD = 3.0, 0.1, np.radians(2.0)
 ANY_HEADING = np.pi / 4.0
 #: Closures that confirm each other come from submaps at most so many apart.
 TOGETHER = 6
-#: Information that any match has: 10 m, 10 rad.
-LEAST_INFORMATION = 0.01
 
 
 @dataclass(frozen=True, eq=False)
@@ -183,8 +181,7 @@ class _Closer:
             return None
         there = se2.compose(poses[near], place.xyyaw)
         on = int(known[np.argmin(self._away(known, there))])
-        information = place.information * self.config.trust
-        cov = np.linalg.inv(_positive(information) + np.eye(3) * LEAST_INFORMATION)
+        cov = np.linalg.inv(information_of(place.information, self.config))
         cov = turned(cov, poses[near, 2] - poses[on, 2]) * self.match_scale
         left = self.config.closure_m, self.config.closure_m, self.config.closure_rad
         cov = cov + np.diag(np.square(left)) * self.match_scale
@@ -236,9 +233,3 @@ class _Closer:
         if one.old != two.old:
             S = S + self.graph.relative(poses, two.old, one.old)
         return bool(off @ np.linalg.solve(S, off) < self.config.gate)
-
-
-def _positive(information: se2.Array) -> se2.Array:
-    """The nearest symmetric matrix without negative eigenvalues."""
-    value, vector = np.linalg.eigh((information + information.T) / 2.0)
-    return np.asarray((vector * np.maximum(value, 0.0)) @ vector.T)

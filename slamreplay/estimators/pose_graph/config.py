@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
 
 @dataclass(frozen=True)
 class GraphConfig:
@@ -52,7 +50,3 @@ class GraphConfig:
     passes: int = 4
     sigma_m: float = 0.02
     points_per_fact: float = 10.0
-
-
-#: Covariance of a start that is held where it is.
-CERTAIN = np.zeros((3, 3))

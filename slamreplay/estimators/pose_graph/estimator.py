@@ -35,7 +35,7 @@ class PoseGraph:
     """SLAM with its own map: submaps, loop closures, and a graph of all nodes.
 
     It begins where the robot's own localizer began, in the map; without a start in a frame of its
-    own, from zero. The log's map is not looked at.
+    own, from zero. The log's map only makes the start precise; it is not looked at after that.
 
     Attributes:
         config: hyper-parameters.
@@ -66,7 +66,7 @@ class PoseGraph:
         Raises:
             NotApplicableError: no scans, or none with enough points.
         """
-        slam = slam_of(view, _set(self.config, view), self.name, is_online=False)
+        slam = slam_of(view, self.config, self.name, is_online=False)
         assert slam.smoothed is not None
         nodes = slam.smoothed
         xyyaw = slam.local.carried(nodes.xyyaw)
@@ -109,9 +109,9 @@ class PoseGraphOnline:
         Raises:
             NotApplicableError: no scans, or none with enough points.
         """
-        slam = slam_of(view, _set(self.config, view), self.name, is_online=True)
-        xyyaw, cov = as_driven(slam.local, slam.maps, slam.closed, slam.first, slam.first_cov)
-        xyyaw[: slam.start_row], cov[: slam.start_row] = np.nan, np.nan
+        slam = slam_of(view, self.config, self.name, is_online=True)
+        xyyaw, cov = as_driven(slam.local, slam.maps, slam.closed, slam.start)
+        xyyaw[: slam.start.row], cov[: slam.start.row] = np.nan, np.nan
         return _estimate(view, slam, xyyaw, cov, {})
 
 
@@ -120,9 +120,10 @@ def _estimate(
 ) -> Estimate:
     local = slam.local
     base = view.manifest.frames.base or "base_link"
-    track = PoseTrack(slam.frame_id, base, local.t_ns, xyyaw, cov)
+    track = PoseTrack(slam.start.frame_id, base, local.t_ns, xyyaw, cov)
     closures = closures_ledger(slam)
     scalars = {
+        "start_score": slam.start.on_map,
         "nodes": float(len(local.nodes)),
         "breaks": float(local.is_break.sum()),
         "submaps": float(len(slam.maps)),
@@ -131,10 +132,6 @@ def _estimate(
         **more,
     }
     return Estimate(track, (matches_ledger(local), closures), {"score": local.scan_score}, scalars)
-
-
-def _set(config: GraphConfig, view: BundleView) -> GraphConfig:
-    return replace(config, min_score=view.settings.get(MIN_SCORE, config.min_score))
 
 
 def _configured(given: Mapping[str, object], where: str) -> GraphConfig:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from slamreplay.estimators.pose_graph.config import GraphConfig
 from slamreplay.geometry import se2
 from slamreplay.matching.branch_and_bound import PoseWindow, best_pose
 from slamreplay.matching.correlative import Window, match, search_window
@@ -23,6 +24,8 @@ MOST_POINTS, FARTHEST_M = 200, 20.0
 HOPELESS = 0.3
 #: More cells than this are never drawn at once.
 ROOM = 9_000_000
+#: Information that any match has: 10 m, 10 rad.
+LEAST_INFORMATION = 0.01
 NEAR, CLOSE = Window(0.1, 0.05, 0.03, 0.015), Window(0.05, 0.05, 0.02, 0.02)
 
 
@@ -103,6 +106,12 @@ class Searcher:
         near = (np.abs(seen - about[:2]) < reach_m).all(axis=1)
         points = seen[near] if near.any() else about[None, :2]
         return points_field(points, max(SIGMA_M, cell_m), cell_m, self._room)
+
+
+def information_of(curvature: se2.Array, config: GraphConfig) -> se2.Array:
+    """Information (3, 3) of a match from the curvature of its score; definite."""
+    value, vector = np.linalg.eigh((curvature + curvature.T) / 2.0 * config.trust)
+    return np.asarray((vector * np.maximum(value, 0.0)) @ vector.T) + LEAST_INFORMATION * np.eye(3)
 
 
 def _evenly(points: se2.Array, limit: int) -> se2.Array:

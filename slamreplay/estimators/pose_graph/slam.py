@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -10,14 +10,14 @@ from slamreplay.bundle.odometry import odometry_track
 from slamreplay.bundle.view import BundleView
 from slamreplay.errors import NotApplicableError
 from slamreplay.estimators.inputs import need_scans
+from slamreplay.estimators.pose_graph.beginning import Beginning, beginning
 from slamreplay.estimators.pose_graph.closing import Closed, close_loops
-from slamreplay.estimators.pose_graph.config import CERTAIN, GraphConfig
+from slamreplay.estimators.pose_graph.config import GraphConfig
 from slamreplay.estimators.pose_graph.smoothing import Smoothed, smoothed
 from slamreplay.estimators.pose_graph.submaps import Submaps, chain_covariances, submaps
 from slamreplay.estimators.scan_matching.local import LocalTrajectory, local_trajectory
-from slamreplay.estimators.start import starts
 from slamreplay.geometry import se2
-from slamreplay.geometry.covariance import composed, swing
+from slamreplay.geometry.covariance import composed
 
 #: Settings a perturbation may change beside those of the start.
 MIN_SCORE = "min_score"
@@ -29,20 +29,14 @@ class Slam:
     """All that was made of a log.
 
     Attributes:
-        frame_id: frame of the poses.
-        start_row: from which row on the start holds; 0 where there is none.
-        first: (3,) pose of the first node.
-        first_cov: (3, 3) of it.
+        start: pose of the first node, and the frame.
         local: every scan in the local frame, and the nodes.
         maps: the submaps.
         closed: the closures, and what was believed when each submap was done.
         smoothed: the nodes once everything is known; None in the online mode.
     """
 
-    frame_id: str
-    start_row: int
-    first: se2.Array
-    first_cov: se2.Array
+    start: Beginning
     local: LocalTrajectory
     maps: Submaps
     closed: Closed
@@ -68,36 +62,26 @@ def slam_of(view: BundleView, config: GraphConfig, estimator: str, *, is_online:
         raise NotApplicableError("no scan has enough points to be matched", where=estimator)
     motion_scale = view.settings.get(PROCESS_NOISE, 1.0)
     match_scale = view.settings.get(MEASUREMENT_NOISE, 1.0)
-    frame, row, first, first_cov = _start(view, local)
+    config = replace(config, min_score=view.settings.get(MIN_SCORE, config.min_score))
+    start = beginning(view, local, config)
     maps = submaps(local, config.submap_m, config.apart_m, motion_scale)
     nodes, at = local.node_xyyaw, int(maps.reference[0])
     way = np.array([0, at])
-    inside = chain_covariances(nodes, local.motion_cov * motion_scale, way)[0] if at else CERTAIN
+    inside = np.zeros((3, 3))
+    if at:
+        inside = chain_covariances(nodes, local.motion_cov * motion_scale, way)[0]
     motion = se2.between(nodes[0], nodes[at])
     closed = close_loops(
         maps,
-        se2.compose(first, motion),
-        composed(first, first_cov, motion, inside),
+        se2.compose(start.xyyaw, motion),
+        composed(start.xyyaw, start.cov, motion, inside),
         config,
         match_scale,
         with_cov=is_online,
     )
     end = None
     if not is_online:
-        end = smoothed(local, maps, closed, first, first_cov, config, motion_scale, match_scale)
-    return Slam(frame, row, first, first_cov, local, maps, closed, end)
-
-
-def _start(view: BundleView, local: LocalTrajectory) -> tuple[str, int, se2.Array, se2.Array]:
-    """Frame, row of the start, and pose and covariance of the first node.
-
-    Only the start is taken from the log's map: what the robot is then, the graph finds out itself.
-    """
-    frames, node = view.manifest.frames, local.node_xyyaw[0]
-    given = starts(view, local.t_ns, local.xyyaw)
-    if not given or given[0].xyyaw is None:
-        return frames.odom or "odom", 0, node, CERTAIN
-    start, there = given[0], given[0].xyyaw
-    first = se2.compose(there, se2.between(local.xyyaw[start.row], node))
-    by = swing(first, there)
-    return frames.map or "map", start.row, first, by @ start.cov @ by.T
+        end = smoothed(
+            local, maps, closed, start.xyyaw, start.cov, config, motion_scale, match_scale
+        )
+    return Slam(start, local, maps, closed, end)
