@@ -23,6 +23,8 @@ DOUBTED_NIS = 40.0
 GUESS_PART, GUESS_M, GUESS_RAD = 0.5, 0.03, 0.03
 #: Where odometry has a gap, to these.
 BRIDGED_PART, BRIDGED_M, BRIDGED_RAD = 0.5, 0.02, 0.02
+#: What a scan's pose misses that nothing else shows, at the least, m and rad.
+JITTER_M, JITTER_RAD = 0.001, 0.0005
 #: How fast the typical score and spread follow.
 RATE = 0.02
 #: Bounds of a point's standard deviation about its line, m.
@@ -58,12 +60,15 @@ class Follower:
         config: hyper-parameters.
         pose: (3,) of the last scan.
         cov: (3, 3) of it against the last node.
-        carried: (3, 3) the same, had nothing been matched since.
+        drift: (3, 3) of what of its error the map takes on: much of a match's error is gone with the
+            next, for a node is laid onto many.
+        carried: (3, 3) of it, had nothing been matched since.
     """
 
     config: MatchConfig
     pose: se2.Array = field(default_factory=lambda: np.zeros(3))
     cov: se2.Array = field(default_factory=lambda: np.zeros((3, 3)))
+    drift: se2.Array = field(default_factory=lambda: np.zeros((3, 3)))
     carried: se2.Array = field(default_factory=lambda: np.zeros((3, 3)))
     motion: se2.Array = field(default_factory=lambda: np.zeros(3))
     learned: se2.Array = field(default_factory=lambda: np.array([1.0, 1.0, fusion.FIRST_SCANS]))
@@ -77,7 +82,8 @@ class Follower:
         self._per_way = np.array([
             c.position_per_metre, c.position_per_turn, c.heading_per_metre, c.heading_per_turn
         ])  # fmt: skip
-        self._prior, self._noise, self._told = np.empty(3), np.empty(2), np.empty(21)
+        self._prior, self._noise, self._told = np.empty(3), np.empty(4), np.empty(30)
+        self._jitter = np.empty((3, 3))
         self._expected, self._held = np.empty((3, 3)), np.empty((3, 3))
         self._room, self._sums = np.empty((3, 3, 3)), np.empty((3, 3))
         self._field: ScoreField | None = None
@@ -91,8 +97,8 @@ class Follower:
     def add_node(self, points: se2.Array, normals: se2.Array) -> se2.Array:
         """Put the last scan into the map; its covariance (3, 3) against the node before."""
         self.map.add(self.pose, points, normals)
-        cov = self.cov.copy()
-        self.cov[:] = 0.0
+        cov = self.drift.copy()
+        self.cov[:] = self.drift[:] = 0.0
         self.carried[:] = 0.0
         self._field = None
         return cov
@@ -116,6 +122,7 @@ class Follower:
             before, self.cov, step, self._per_way, self.learned, least,
             self._prior, self._noise, self._expected, self._held,
         )  # fmt: skip
+        fusion.late(self._prior, step, self.config.late_part, _JITTER, self._jitter)
         prior = self._prior.copy()
         fusion.carry_on(
             self.carried, prior[0] - before[0], prior[1] - before[1], self._noise, self._room
@@ -131,7 +138,10 @@ class Follower:
             poor = True
         if poor:
             return self._missed(prior, score, matched=len(points) >= LEAST_POINTS)
-        fusion.both(self.carried, self._told, self.cov, self._room)
+        told = self._told
+        fusion.both(self.carried, told[12:21].reshape(3, 3), self.cov, self._room)
+        held = told[21:].reshape(3, 3) / self.config.drift_part
+        fusion.both(self.carried, held, self.drift, self._room)
         self.typical += RATE * (score - self.typical)
         self.lost = 0
         self.pose = pose
@@ -147,7 +157,7 @@ class Follower:
 
     def _missed(self, prior: se2.Array, score: float, *, matched: bool) -> Fit:
         self.pose = prior
-        self.cov = self.carried.copy()
+        self.cov, self.drift = self.carried.copy(), self.carried.copy()
         self.motion = np.zeros(3)
         self.lost += matched
         told = self._told
@@ -177,7 +187,7 @@ class Follower:
         variance = max(self.variance, FINEST_M**2) * c.points_per_fact
         nis = fusion.fuse(
             self._prior, self._expected, self._held, self._noise, pose, self._sums, variance,
-            self.learned, self._told, self._room,
+            self._jitter, self.learned, self._told, self._room,
         )  # fmt: skip
         if score > c.poor * self.typical:
             self.variance += RATE * (squares - self.variance)
@@ -209,3 +219,4 @@ class Follower:
 
 
 _LEAST = np.array([fusion.LEAST_M, fusion.LEAST_RAD])
+_JITTER = np.array([JITTER_M, JITTER_RAD])
