@@ -24,7 +24,8 @@ class MatchConfig:
         heading_per_turn: rad after turning by 1 rad.
         drift_part: of a match's variance the map takes on so much as drift.
         late_part: a scan's stamp is off by this share of the time between two scans.
-        poor: a match is doubted that scores less than this share of what matches do there.
+        doubted: a match that scores less than this share of what matches do is looked for again.
+        poor: one that scores less than this share is none.
         lost_scans: after so many scans that match nothing a new map is begun.
     """
 
@@ -39,5 +40,6 @@ class MatchConfig:
     heading_per_turn: float = 0.3
     drift_part: float = 0.3
     late_part: float = 0.05
-    poor: float = 0.5
+    doubted: float = 0.8
+    poor: float = 0.45
     lost_scans: int = 5

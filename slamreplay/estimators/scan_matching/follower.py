@@ -18,6 +18,8 @@ LEAST_POINTS = 10
 GAIN = 0.05
 #: Innovations beyond this (chi-square of 3) are looked into.
 DOUBTED_NIS = 40.0
+#: Beyond this odometry missed what the scan moved by.
+REFUTED_NIS = 16.0
 #: Where no odometry tells a step the speed of before is expected: it is known to this part, and to
 #: this at the least, m and rad.
 GUESS_PART, GUESS_M, GUESS_RAD = 0.5, 0.03, 0.03
@@ -130,15 +132,16 @@ class Follower:
         score, nis, pose = 0.0, np.inf, prior.copy()
         if len(points) >= LEAST_POINTS:
             score, nis = self._laid(points, normals, pose)
-            poor = score < self.config.poor * self.typical
-            if poor or nis > DOUBTED_NIS:
+            if score < self.config.doubted * self.typical or nis > DOUBTED_NIS:
                 score, nis, pose = self._searched(points, normals, before, pose, score, nis)
-                poor = score < self.config.poor * self.typical
-        else:
-            poor = True
+        poor = len(points) < LEAST_POINTS or score < self.config.poor * self.typical
         if poor:
             return self._missed(prior, score, matched=len(points) >= LEAST_POINTS)
         told = self._told
+        off = pose - prior
+        off[2] = se2.wrap_angle(off[2])
+        if nis > REFUTED_NIS:  # wheels that slip, a robot that is carried
+            self.carried += np.outer(off, off)
         fusion.both(self.carried, told[12:21].reshape(3, 3), self.cov, self._room)
         held = told[21:].reshape(3, 3) / self.config.drift_part
         fusion.both(self.carried, held, self.drift, self._room)
@@ -150,9 +153,6 @@ class Follower:
         self.motion = np.array([
             c * moved[0] + s * moved[1], c * moved[1] - s * moved[0], se2.wrap_angle(moved[2])
         ])  # fmt: skip
-        told = self._told
-        off = pose - prior
-        off[2] = se2.wrap_angle(off[2])
         return Fit(pose, told[:3].copy(), told[3:12].reshape(3, 3).copy(), score, True, off)
 
     def _missed(self, prior: se2.Array, score: float, *, matched: bool) -> Fit:
@@ -179,15 +179,15 @@ class Follower:
     def _laid(self, points: se2.Array, normals: se2.Array, pose: se2.Array) -> tuple[float, float]:
         """Score and r' S^-1 r of the scan, its `pose` moved to where it lies best."""
         c = self.config
-        score, squares, _ = align(
+        score, squares, trust = align(
             self.map.tags, self.map.lines, self.map.now - c.memory, points, normals, pose,
             self._prior, self._held, c.sigma_m, c.points_per_fact, self._sums,
         )  # fmt: skip
         pose[2] = se2.wrap_angle(pose[2])
         variance = max(self.variance, FINEST_M**2) * c.points_per_fact
         nis = fusion.fuse(
-            self._prior, self._expected, self._held, self._noise, pose, self._sums, variance,
-            self._jitter, self.learned, self._told, self._room,
+            self._prior, self._expected, self._held, trust, self._noise, pose, self._sums,
+            variance, self._jitter, self.learned, self._told, self._room,
         )  # fmt: skip
         if score > c.poor * self.typical:
             self.variance += RATE * (squares - self.variance)

@@ -86,16 +86,17 @@ def _swung(cov, dx, dy, out):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def fuse(prior, expected, held, noise, pose, per_point, variance, jitter, learned, told, room):  # type: ignore[no-untyped-def]
+def fuse(prior, expected, held, trust, noise, pose, per_point, variance, jitter, learned, told, room):  # type: ignore[no-untyped-def]
     """What the match said, from where prior and match met.
 
-    The top of both, `pose`, has H (match - pose) = held (pose - prior): so the match alone would
-    have been at pose + H^-1 held (pose - prior).
+    The top of both, `pose`, has H (match - pose) = trust held (pose - prior): so the match alone
+    would have been at pose + H^-1 trust held (pose - prior).
 
     Args:
         prior: (3,).
         expected: (3, 3) covariance of the prior.
         held: (3, 3) its inverse.
+        trust: how much of `held` was used, 0 to 1.
         noise: (4,) variances of the step, as in `predict`.
         pose: (3,) of both.
         per_point: (3, 3) sum of the points' information at a variance of 1.
@@ -123,6 +124,7 @@ def fuse(prior, expected, held, noise, pose, per_point, variance, jitter, learne
     gx = held[0, 0] * ex + held[0, 1] * ey + held[0, 2] * et
     gy = held[1, 0] * ex + held[1, 1] * ey + held[1, 2] * et
     gt = held[2, 0] * ex + held[2, 1] * ey + held[2, 2] * et
+    gx, gy, gt = trust * gx, trust * gy, trust * gt
     told[0] = ex + R[0, 0] * gx + R[0, 1] * gy + R[0, 2] * gt
     told[1] = ey + R[1, 0] * gx + R[1, 1] * gy + R[1, 2] * gt
     told[2] = et + R[2, 0] * gx + R[2, 1] * gy + R[2, 2] * gt
