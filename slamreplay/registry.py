@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from difflib import get_close_matches
 from importlib import import_module
 from importlib.metadata import entry_points
 from typing import Any
 
 from slamreplay.errors import UsageError
+
+
+def nearest(name: str, names: Iterable[str]) -> str:
+    """A hint for a name that there is not: the nearest one, else all there are."""
+    there = list(names)
+    near = get_close_matches(name, there, n=1)
+    return f"did you mean '{near[0]}'?" if near else f"there are: {', '.join(there)}"
 
 
 class Registry:
@@ -46,8 +53,6 @@ class Registry:
         """
         targets = self.targets()
         if name not in targets:
-            near = get_close_matches(name, targets, n=1)
-            hint = f"did you mean '{near[0]}'?" if near else f"there are: {', '.join(targets)}"
-            raise UsageError(f"there is no {self.kind} '{name}'", hint=hint)
+            raise UsageError(f"there is no {self.kind} '{name}'", hint=nearest(name, targets))
         module, _, attribute = targets[name].partition(":")
         return getattr(import_module(module), attribute)

@@ -78,4 +78,5 @@ def _sightings(rng, noise, t_ns, truth, wrong):
     return Observations(
         t_ns[row], np.full(M, "fiducial", dtype=object), np.where(misread, other, thing),
         PLACES, polar, np.full(M, 2), np.full((M, 3, 3), np.nan), 0,
+        np.array([f"tag {k}" for k in range(len(PLACES))]),
     )  # fmt: skip

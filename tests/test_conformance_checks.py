@@ -8,11 +8,12 @@ import pytest
 from audited import healthy
 from beliefs import ar1, context
 
+from slamreplay.bundle.belief import belief_times, recorded_belief
 from slamreplay.bundle.findings import Finding
 from slamreplay.consistency import ABOUT_BELIEF, AUDITS, CHECKS
 from slamreplay.consistency.asking import ask
 from slamreplay.consistency.context import CheckContext
-from slamreplay.testing import ConformanceError, believed, check_check
+from slamreplay.testing import ConformanceError, believed, check_check, synthetic_bundle
 
 
 def torn(seed):
@@ -45,6 +46,14 @@ def wrong_in_direction(seed):
     return context(white * [0.5, 2.0, 0.5])
 
 
+def jumping(seed):
+    """A localizer that goes over to a place a metre away."""
+    view = synthetic_bundle(
+        seconds=4.0, seed=seed, belief_offset_xyyaw=(1.0, 0, 0), offset_from_s=3.0
+    ).view()
+    return CheckContext(recorded_belief(view, belief_times(view)), (), view)
+
+
 #: Of each check about a belief: the finding that names its defect, and a log that has it.
 BELIEF_LINES = {
     "belonging": ("SR-CON-011", torn),
@@ -52,6 +61,7 @@ BELIEF_LINES = {
     "credibility_index": ("SR-CON-005", wrong_in_direction),
     "distribution": ("SR-CON-004", partial(believed, rows=3000, wild=0.03)),
     "innovation_bias": ("SR-CON-008", partial(believed, bias=0.5)),
+    "jumps": ("SR-LOC-005", jumping),
     "nees": ("SR-CON-001", partial(believed, rows=3000, told=0.5)),
     "nis": ("SR-CON-006", partial(believed, told=0.5)),
     "scan_likelihood": ("SR-CON-009", unlikely_scans),

@@ -7,7 +7,8 @@ from slamreplay.bundle.run import Run, Trial, read_run, run_bytes
 from slamreplay.bundle.schema import TABLES
 from slamreplay.bundle.tables import Table
 from slamreplay.errors import NotApplicableError
-from slamreplay.estimators.ekf.estimator import MEASUREMENT_NOISE, PROCESS_NOISE, Ekf
+from slamreplay.estimators.dead_reckoning import DeadReckoning
+from slamreplay.estimators.ekf.estimator import MEASUREMENT_NOISE, PROCESS_NOISE, Ekf, EkfTuned
 from slamreplay.estimators.ekf.noise import Noise
 from slamreplay.estimators.start import GLOBAL
 from slamreplay.geometry import se2
@@ -73,13 +74,38 @@ def test_things_without_a_survey_are_counted_and_not_used():
     scalars = Ekf().run(known, seed=1).scalars
     assert scalars["sightings_without_survey"] == seen > 0
     none = transforms.take(~np.char.startswith(transforms["child_frame"].astype(str), "tag"))
-    with pytest.raises(NotApplicableError, match="survey"):
-        Ekf().run(TAGGED.view().with_table(none), seed=1)
+    unknown = TAGGED.view().with_table(none)
+    assert Ekf().run(unknown, seed=1).scalars["sightings_without_survey"] > seen
+    for view, estimator in ((unknown, EkfTuned()), (unknown.with_setting(GLOBAL, 1.0), Ekf())):
+        with pytest.raises(NotApplicableError, match="survey"):
+            estimator.run(view, seed=1)
 
 
-def test_a_log_without_sightings_is_named():
+def test_without_sightings_it_carries_odometry_on():
+    """In the map from a pose in it, in the odometry's own frame from zero; tuning has no ground."""
+    blind = edits.without(TAGGED, "sightings")
+    startless = synthetic_bundle(seconds=20.0, with_belief=False, with_initial_pose=False)
+    for view in (blind.view(), startless.view()):
+        found, plain = Ekf().run(view, seed=0).track, DeadReckoning().run(view, seed=0).track
+        assert found.frame_id == plain.frame_id
+        assert np.abs(np.trace(found.cov - plain.cov, axis1=1, axis2=2)).max() < 0.01
+        origin = se2.compose(plain.xyyaw[0], se2.inverse(found.xyyaw[0]))
+        np.testing.assert_allclose(se2.compose(origin, found.xyyaw), plain.xyyaw, atol=1e-9)
     with pytest.raises(NotApplicableError, match="sightings"):
-        Ekf().run(edits.without(TAGGED, "sightings").view(), seed=0)
+        EkfTuned().run(blind.view(), seed=0)
+    with pytest.raises(NotApplicableError, match="sightings"):
+        Ekf().run(blind.view().with_setting(GLOBAL, 1.0), seed=0)
+
+
+def test_the_ledger_tells_what_was_seen_and_how_far_it_moved_the_belief():
+    for one in Ekf().run(TAGGED.view(), seed=1).innovations:
+        assert one.frame_id == "base_link"
+        assert set(one.about) <= {f"fiducial tag_{k}" for k in range(6)}
+        assert np.isfinite(one.moved).all()
+        assert (one.moved[~one.accepted] == 0.0).all()
+        assert (np.abs(one.moved[one.accepted]).max(axis=1) > 0.0).all()
+    first = min(Ekf().run(TAGGED.view(), seed=1).innovations, key=lambda i: i.t_ns[0])
+    assert np.hypot(*first.moved[0, :2]) > 0.02  # off by 0.14 m at the start
 
 
 def test_wrong_barcodes_are_rejected_and_kept():

@@ -58,6 +58,21 @@ def test_json_holds_every_trial_with_numbers_or_null(bundle, tmp_path):
     assert trials[0]["metrics"]["baseline_max_m"] == 0.0
 
 
+def test_parameters_from_a_file_reach_the_estimator_and_are_told(bundle, tmp_path):
+    (tmp_path / "nav2_params.yaml").write_text(
+        "amcl: {ros__parameters: {max_particles: 60, min_particles: 30, tf_broadcast: true}}"
+    )
+    out = ("-o", tmp_path / "R", "--parameters", tmp_path / "nav2_params.yaml")
+
+    ran = call(bundle, *out, "-e", "amcl", "-e", "dead_reckoning", "--json")
+
+    assert "amcl: 2 parameters given, 1 of the live node has no part" in ran.stderr
+    trials = json.loads(ran.stdout)["trials"]
+    assert [t["parameters"] for t in trials] == [{"max_particles": 60, "min_particles": 30}, None]
+    runs = read_runs(tmp_path / "R")[1]
+    assert runs[0].estimate.diagnostics["particles"].max() <= 60
+
+
 @pytest.mark.parametrize(
     ("arguments", "fault"),
     [

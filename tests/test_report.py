@@ -36,6 +36,7 @@ from slamreplay.report.innovations import innovations
 from slamreplay.report.junit import junit_xml
 from slamreplay.report.model import SCHEMA_FILE, Report, schema_text
 from slamreplay.report.phrases import bound
+from slamreplay.report.tables import trials as trial_table
 from slamreplay.report.writer import write_report
 from slamreplay.testing.synthetic import START_NS, room_grid, synthetic_bundle, true_path
 from slamreplay.verdict.judgement import Action, FailureMode, Interval, Judgement, Stop
@@ -141,6 +142,18 @@ def bare(post) -> Postmortem:
     )
 
 
+def test_the_trial_table_says_that_parameters_were_given(post):
+    given = Trial("b", "amcl", 0, parameters='{"alpha1":0.1,"z_hit":0.9}')
+    runs = (*post.trials, TrialResult(Run(given, post.trials[0].run.estimate), {}))
+    post = replace(post, trials=runs)
+
+    table = trial_table(post)
+
+    assert [row[0].aside for row in table.rows] == ["", "", "2 parameters given", ""]
+    told = [t["parameters"] for t in json.loads(build(post).json_text())["trials"]]
+    assert told == [None, None, None, {"alpha1": 0.1, "z_hit": 0.9}]
+
+
 def test_shipped_schema_is_the_models():
     assert SCHEMA_FILE.read_text(encoding="utf-8") == schema_text()
     jsonschema.Draft202012Validator.check_schema(json.loads(schema_text()))
@@ -193,7 +206,7 @@ def test_trial_that_does_not_apply_is_marked(post):
     assert trials[0]["level"] is None
     assert trials[1] == {
         "estimator": "amcl", "perturbation": "tf_delay.all", "level": 0.2, "unit": "s",
-        "metrics": {"nees_mean": 4.0},
+        "parameters": None, "metrics": {"nees_mean": 4.0},
     }  # fmt: skip
     assert trials[2]["metrics"] == {"not_applicable": True}
 

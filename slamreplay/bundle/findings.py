@@ -84,6 +84,19 @@ FINDINGS: dict[str, Explanation] = {
         "worse than the log's typical one; longer than 1 s.",
         "Heavy changes lower the match as well; beams known to have changed are not counted.",
     ),
+    "SR-LOC-005": Explanation(
+        "The belief jumped",
+        "Did the belief step as odometry did not, and which measurement made it?",
+        "From row to row of its path, belief against the belief before it carried on by odometry: "
+        "0.2 m or 10 deg is worth a word, 0.5 m or 20 deg a warning unless a pose was given then "
+        "or the best reference (hindsight, where there is no other) says it led home. Of a run the "
+        "cause is the row of its residual ledger that moved it most in between, where that is half "
+        "of the jump at least. A recorded localizer leaves no ledger: named is what the log holds "
+        "near it (closures of a SLAM graph, given poses, tags seen anew, relocalizations, maps, "
+        "jumps of odometry), how long it was silent, and whether its particles stood there.",
+        "What lies near in time need not be the cause. A right correction is as large as the error "
+        "before it. Without odometry nothing tells a jump from driving.",
+    ),
     "SR-MAP-001": Explanation(
         "The aisle had changed",
         "Do beams, cast from where the robot really was, contradict the map and stay that way?",

@@ -25,6 +25,8 @@ RUN_FORMAT = 2
 class Trial:
     """A bundle, an estimator, a seed, and at most one perturbation: the type holds no second one.
 
+    What the estimator was configured with is the same in every trial that is laid beside another.
+
     Attributes:
         bundle_id: which evidence.
         estimator: name in the estimator registry.
@@ -32,6 +34,7 @@ class Trial:
         perturbation: `NAME.VARIANT`, or None for the baseline.
         level: the perturbation's one number, in `unit`; None for the baseline.
         unit: s, m, deg or ratio.
+        parameters: of the estimator, as canonical JSON; empty where it ran with its defaults.
     """
 
     bundle_id: str
@@ -40,11 +43,25 @@ class Trial:
     perturbation: str | None = None
     level: float | None = None
     unit: str = ""
+    parameters: str = ""
+
+    @property
+    def record(self) -> dict[str, Any]:
+        """Every attribute for a file; `parameters` only where there are some."""
+        told = asdict(self)
+        if not self.parameters:
+            del told["parameters"]
+        return told
+
+    @property
+    def given(self) -> dict[str, Any] | None:
+        """The estimator's parameters by name; None where it ran with its defaults."""
+        return json.loads(self.parameters) if self.parameters else None
 
     @property
     def id(self) -> str:
         """Short hash that names the trial's files."""
-        return hashlib.sha256(json.dumps(asdict(self)).encode()).hexdigest()[:16]
+        return hashlib.sha256(json.dumps(self.record).encode()).hexdigest()[:16]
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +108,11 @@ class Innovations:
     @property
     def nis(self) -> Array:
         """(N,) normalised innovation squared r' S^-1 r; NaN where S is no covariance."""
-        S, r = np.asarray(self.S), np.asarray(self.residual)
+        return self.nis_of(slice(None))
+
+    def nis_of(self, rows: NDArray[np.int64] | slice) -> Array:
+        """The same of some rows alone."""
+        S, r = np.asarray(self.S)[rows], np.asarray(self.residual)[rows]
         known = is_positive_definite(S) & np.isfinite(r).all(axis=1)
         out = np.full(len(r), np.nan)
         L = np.linalg.cholesky(S[known])
@@ -131,7 +152,7 @@ def run_bytes(run: Run) -> bytes:
     arrays: dict[str, NDArray] = {}
     head: dict[str, object] = {
         "run_format": RUN_FORMAT,
-        "trial": asdict(run.trial),
+        "trial": run.trial.record,
         "not_applicable": run.not_applicable,
     }
     if run.estimate is not None:

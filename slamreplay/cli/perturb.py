@@ -26,6 +26,15 @@ Perturbations = Annotated[
         help="One change, e.g. tf_delay=0.2; several by repeating it, each run by itself.",
     ),
 ]
+Parameters = Annotated[
+    list[Path] | None,
+    typer.Option(
+        "--parameters",
+        metavar="YAML",
+        help="Parameters of the estimators, as nav2_params.yaml or of rosparam; several by "
+        "repeating it, the later holds.",
+    ),
+]
 Logs = Annotated[
     list[Path] | None,
     typer.Argument(
@@ -68,6 +77,7 @@ def perturb(
     recipe: Recipe = None,
     perturbations: Perturbations = None,
     estimators: Estimators = None,
+    parameters: Parameters = None,
     seed: Seed = None,
     map_yaml: options.MapYaml = None,
     topics: options.Topics = None,
@@ -89,6 +99,7 @@ def perturb(
             "LOG": logs,
             "--perturbation": perturbations,
             "--estimator": estimators,
+            "--parameters": parameters,
             "--map": map_yaml,
             "--topics": topics,
             "--robot": robot,
@@ -96,8 +107,8 @@ def perturb(
             "--start": start_s,
             "--end": end_s,
         }
-        given = [name for name, value in only_logs.items() if value not in (None, [])]
-        run_lab(recipe, output, seed=seed, given=given, as_json=as_json)
+        foreign = [name for name, value in only_logs.items() if value not in (None, [])]
+        run_lab(recipe, output, seed=seed, given=foreign, as_json=as_json)
         return
     if not logs:
         raise UsageError("there is no LOG to replay", hint="name one, or a lab with --recipe")
@@ -108,13 +119,18 @@ def perturb(
     from slamreplay.replay.design import design, parse_perturbation, usual_estimators
     from slamreplay.replay.folder import RUNS, write_runs
     from slamreplay.replay.metrics import trial_metrics
+    from slamreplay.replay.parameters import Configuration, read_parameters
     from slamreplay.replay.runner import replay
 
     check_target(output, RUNS)
     for text in perturbations or ():  # before minutes are spent on reading the log
         parse_perturbation(text)
-    for name in estimators or ():
+    chosen = estimators or list(ESTIMATORS)
+    for name in chosen:
         ESTIMATORS.load(name)
+    given = read_parameters(parameters, chosen, robot) if parameters else Configuration({}, ())
+    for line in given.told:
+        typer.echo(line, err=True)
     how = options.ingest_options(
         map_yaml=map_yaml,
         topics=topics,
@@ -125,7 +141,7 @@ def perturb(
     )
     with options.evidence(logs, how) as bundle:
         names = estimators or usual_estimators(bundle)
-        trials = design(bundle, names, perturbations or (), seed or 0)
+        trials = design(bundle, names, perturbations or (), seed or 0, given.of)
         with progress_bar("replaying") as progress:
             runs = replay(bundle, trials, progress=progress, cache=cache_folder() / "runs")
         is_raw = bundle.path is None or bundle.path.resolve() != logs[0].resolve()
@@ -136,6 +152,7 @@ def perturb(
                 "perturbation": run.trial.perturbation,
                 "level": run.trial.level,
                 "unit": run.trial.unit,
+                "parameters": run.trial.given,
                 "not_applicable": run.not_applicable,
                 "metrics": trial_metrics(run, runs, bundle),
             }

@@ -41,20 +41,28 @@ class Start:
     cov: se2.Array
 
 
-def starts(view: BundleView, t_ns: NDArray[np.int64], T_odom_base: se2.Array) -> list[Start]:
+def starts(
+    view: BundleView,
+    t_ns: NDArray[np.int64],
+    T_odom_base: se2.Array,
+    told: tuple[se2.Array, se2.Array] | None = None,
+) -> list[Start]:
     """Every pose that is given to an estimator, in order of rows; empty where nobody said any.
 
     Args:
         view: the log, and the settings that perturb its first start.
         t_ns: (N,) times of the estimator's rows, sorted.
         T_odom_base: (N, 3) odometry at these times, NaN where unknown: there nothing starts.
+        told: pose (3,) and covariance (3, 3) to begin with instead of the first recorded belief.
 
     Raises:
         NotApplicableError: the first start is to be moved, and there is none.
     """
     rows = np.flatnonzero(np.isfinite(T_odom_base).all(axis=1))
     found = _given(view, t_ns, T_odom_base, rows)
-    belief = recorded_belief(view, t_ns[rows])
+    belief = recorded_belief(view, t_ns[rows]) if told is None else None
+    if told is not None and len(rows) and (not found or rows[0] < found[0].row):
+        found.insert(0, Start(int(rows[0]), *told))
     if belief is not None and belief.has_pose.any():
         k = int(np.argmax(belief.has_pose))
         if not found or rows[k] < found[0].row:

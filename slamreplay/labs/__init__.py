@@ -11,5 +11,6 @@ LABS = Registry(
     {
         "covariance_breathing": "slamreplay.labs.covariance_breathing.lab:CovarianceBreathing",
         "interval_calibration": "slamreplay.labs.interval_calibration.lab:IntervalCalibration",
+        "two_run": "slamreplay.labs.two_run.lab:TwoRun",
     },
 )

@@ -11,7 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from slamreplay.errors import UsageError
 from slamreplay.labs import LABS
 from slamreplay.labs.lab import Lab
-from slamreplay.recipes.plain_yaml import read_plain_yaml
+from slamreplay.plain_yaml import read_plain_yaml
 from slamreplay.recipes.validation import unknown_key, validated
 
 VERSION = 1
@@ -51,7 +51,7 @@ def read_recipe(path: Path) -> LabRecipe:
         UsageError: no plain YAML, another version, a lab or a key that there is not, or a value
             that makes no sense: one line with the file, the key and a hint.
     """
-    given = read_plain_yaml(path)
+    given = read_plain_yaml(path, kind="recipe", hint="begin with version: 1")
     version = given.get("version", VERSION)
     if type(version) is not int or version != VERSION:
         said = repr(version)[:40]

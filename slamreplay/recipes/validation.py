@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, TypeVar, get_args
 
@@ -11,6 +10,7 @@ from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
 from slamreplay.errors import UsageError
+from slamreplay.registry import nearest
 
 Model = TypeVar("Model", bound=BaseModel)
 
@@ -40,10 +40,7 @@ def validated(model: type[Model], given: Mapping[str, Any], path: Path, under: s
 
 def unknown_key(key: str, keys: Iterable[str]) -> tuple[str, str]:
     """What is wrong with a key that there is not, and the nearest there is."""
-    keys = sorted(keys)
-    near = get_close_matches(key.rpartition(".")[2], keys, n=1)
-    hint = f"did you mean '{near[0]}'?" if near else f"there are: {', '.join(keys)}"
-    return f"there is no key {key[:80]!r}", hint
+    return f"there is no key {key[:80]!r}", nearest(key.rpartition(".")[2], sorted(keys))
 
 
 def _told(fault: ErrorDetails, model: type[BaseModel], under: str) -> tuple[str, str | None]:

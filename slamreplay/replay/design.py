@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 
 from slamreplay.bundle.run import Trial
 from slamreplay.bundle.view import Bundle
@@ -20,7 +21,11 @@ def usual_estimators(bundle: Bundle) -> list[str]:
 
 
 def design(
-    bundle: Bundle, estimators: Sequence[str], perturbations: Sequence[str], seed: int
+    bundle: Bundle,
+    estimators: Sequence[str],
+    perturbations: Sequence[str],
+    seed: int,
+    parameters: Mapping[str, str] = MappingProxyType({}),
 ) -> list[Trial]:
     """The baseline of every estimator, then each perturbation with every estimator.
 
@@ -29,6 +34,7 @@ def design(
         estimators: names in the registry.
         perturbations: texts `NAME[.VARIANT]=LEVEL`; a bare name means its first variant.
         seed: of every trial: what differs between two of them is the perturbation alone.
+        parameters: canonical JSON by estimator, for those that do not run with their defaults.
 
     Raises:
         UsageError: an unknown name, no estimator, or a level that makes no sense.
@@ -44,7 +50,15 @@ def design(
         name, variant, level, unit = parse_perturbation(text)
         columns.append((f"{name}.{variant}", level, unit))
     trials = [
-        Trial(bundle.manifest.bundle_id, estimator, seed, perturbation, level, unit)
+        Trial(
+            bundle.manifest.bundle_id,
+            estimator,
+            seed,
+            perturbation,
+            level,
+            unit,
+            parameters.get(estimator, ""),
+        )
         for perturbation, level, unit in columns
         for estimator in estimators
     ]

@@ -6,7 +6,6 @@ import json
 import os
 import shutil
 from collections.abc import Sequence
-from dataclasses import asdict
 from pathlib import Path
 
 from slamreplay.bundle.atomic import atomic_folder
@@ -44,7 +43,7 @@ def write_runs(
         "bundle_id": bundle.manifest.bundle_id,
         "bundle": Path(relative).as_posix(),
         "trials": [
-            {**asdict(run.trial), "run": f"runs/{run.trial.id}.npz", "reason": run.not_applicable}
+            {**run.trial.record, "run": f"runs/{run.trial.id}.npz", "reason": run.not_applicable}
             for run in runs
         ],
     }

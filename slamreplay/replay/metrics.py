@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -18,10 +19,10 @@ Metrics = dict[str, float | None]
 
 
 def baseline_of(run: Run, runs: Sequence[Run]) -> Run | None:
-    """The undisturbed run of the same estimator and seed."""
+    """The undisturbed run of the same estimator with the same parameters and seed."""
+    undisturbed = replace(run.trial, perturbation=None, level=None, unit="")
     for other in runs:
-        same = (other.trial.estimator, other.trial.seed) == (run.trial.estimator, run.trial.seed)
-        if same and other.trial.perturbation is None:
+        if other.trial == undisturbed:
             return other
     return None
 

@@ -6,7 +6,6 @@ import hashlib
 import inspect
 import json
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import asdict
 from functools import cache as once
 from pathlib import Path
 from typing import Any
@@ -21,6 +20,7 @@ from slamreplay.errors import BundleError, NotApplicableError, OutputError, Usag
 from slamreplay.estimators import ESTIMATORS
 from slamreplay.perturb import PERTURBATIONS
 from slamreplay.replay.parallel import run_each, worth_workers
+from slamreplay.replay.parameters import configured
 
 #: Random numbers of the perturbation do not depend on how many the estimator draws.
 _PERTURBATION_STREAM = 1
@@ -50,7 +50,8 @@ def replay(
             that is not on disk are done in this one. Runs are the same bit by bit.
 
     Raises:
-        UsageError: a trial is of another bundle, or names what does not exist.
+        UsageError: a trial is of another bundle, or names what does not exist, or has parameters
+            that its estimator does not take.
     """
     for trial in trials:
         if trial.bundle_id != bundle.manifest.bundle_id:
@@ -75,7 +76,7 @@ def replay(
 
 def run_trial(bundle: Bundle, trial: Trial) -> Run:
     """One run, computed afresh."""
-    estimator = ESTIMATORS.load(trial.estimator)()
+    estimator = configured(trial.estimator, trial.parameters)
     view = bundle.view()
     try:
         _refuse_recorded(trial, estimator)
@@ -132,7 +133,8 @@ def into_cache(bundle: Bundle, trial: Trial, cache: Path | None) -> Run:
 def _key(trial: Trial) -> str:
     """Hash of everything a run depends on: evidence, trial, configuration, code, numpy."""
     estimator = ESTIMATORS.load(trial.estimator)
-    parts = [json.dumps(asdict(trial)), repr(estimator()), _code(), np.__version__]
+    configuration = repr(configured(trial.estimator, trial.parameters))
+    parts = [json.dumps(trial.record), configuration, _code(), np.__version__]
     parts.append(_source(estimator))
     if trial.perturbation is not None:
         perturbation = PERTURBATIONS.load(trial.perturbation.partition(".")[0])

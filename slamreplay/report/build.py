@@ -128,5 +128,6 @@ def _trial(result: TrialResult) -> TrialPart:
         perturbation=trial.perturbation,
         level=trial.level,
         unit=trial.unit,
+        parameters=trial.given,
         metrics=metrics,
     )

@@ -182,13 +182,15 @@ class FindingPart(_Strict):
 class TrialPart(_Strict):
     """One estimator run; perturbation and level are null for the baseline.
 
-    A trial the estimator could not honour has the one metric `not_applicable`, true.
+    `parameters` is what the estimator was given from files, null where it ran with its defaults. A
+    trial the estimator could not honour has the one metric `not_applicable`, true.
     """
 
     estimator: Text
     perturbation: str | None
     level: Number
     unit: Text
+    parameters: dict[str, Any] | None
     metrics: dict[str, bool | Number]
 
 

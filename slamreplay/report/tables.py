@@ -160,17 +160,18 @@ def trials(post: Postmortem) -> Table:
         names = [name for name in names if not name.startswith("hindsight_")]
     order = list(dict.fromkeys(t.run.trial.estimator for t in post.trials))
     baselines = {
-        (t.run.trial.estimator, t.run.trial.seed): t.metrics
+        (t.run.trial.estimator, t.run.trial.parameters, t.run.trial.seed): t.metrics
         for t in post.trials
         if t.run.trial.perturbation is None
     }
     rows: list[list[str | Cell]] = []
     for result in sorted(post.trials, key=lambda t: order.index(t.run.trial.estimator)):
         trial = result.run.trial
-        undisturbed = baselines.get((trial.estimator, trial.seed), {})
+        undisturbed = baselines.get((trial.estimator, trial.parameters, trial.seed), {})
         base = {} if trial.perturbation is None else undisturbed
+        given = f"{len(trial.given)} parameters given" if trial.given else ""
         cells: list[str | Cell] = [
-            trial.estimator,
+            Cell(trial.estimator, given),
             trial.perturbation or "baseline",
             NOT_KNOWN if trial.level is None else f"{trial.level:g} {trial.unit}".strip(),
         ]

@@ -47,7 +47,7 @@ def pose_columns(xyyaw: se2.Array) -> dict[str, se2.Array]:
     return {"position_xyz": position, "orientation_xyzw": se3.quaternion_from_yaw(xyyaw[:, 2])}
 
 
-def table_of(name: str, topic: str, t_s: NDArray[np.float64], **columns: Any) -> Table:
+def table_of(name: str, topic: str, t_s: NDArray[np.float64], /, **columns: Any) -> Table:
     """A table whose scalars are repeated for every row."""
     t_ns = ns_of(t_s)
     whole: dict[str, Any] = {

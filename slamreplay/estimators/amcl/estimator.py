@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import ClassVar
+from typing import ClassVar, Self
 
 import numpy as np
 
@@ -11,9 +12,11 @@ from slamreplay.bundle.run import Estimate
 from slamreplay.bundle.scans import ScanSet
 from slamreplay.bundle.track import PoseTrack
 from slamreplay.bundle.view import BundleView
+from slamreplay.errors import NotApplicableError
 from slamreplay.estimators.amcl.config import AmclConfig
 from slamreplay.estimators.amcl.filter import AmclFilter
 from slamreplay.estimators.amcl.laser import Beams, used_beams
+from slamreplay.estimators.amcl.parameters import LIVE, NAMES, config_from
 from slamreplay.estimators.amcl.scan_quantile import ScanQuantile
 from slamreplay.estimators.inputs import need_grid, need_odometry, need_scans
 from slamreplay.estimators.start import DEFAULT_COV, GLOBAL, OFFSET, ROTATE, Start, starts
@@ -38,9 +41,20 @@ class Amcl:
     config: AmclConfig = field(default_factory=AmclConfig)
     judge_scans: bool = True
 
+    parameter_names: ClassVar[frozenset[str]] = NAMES
+    live_parameters: ClassVar[tuple[str, ...]] = LIVE
     name: ClassVar[str] = "amcl"
     needs: ClassVar[frozenset[str]] = frozenset({"odometry", "scans", "map"})
     settings: ClassVar[frozenset[str]] = frozenset({OFFSET, ROTATE, GLOBAL})
+
+    @classmethod
+    def from_parameters(cls, given: Mapping[str, object]) -> Self:
+        """AMCL with parameters of nav2_amcl or of ROS 1's amcl, by their names.
+
+        Raises:
+            UsageError: one that there is not, or a value that makes no sense.
+        """
+        return cls(config_from(given, cls.name))
 
     def run(self, view: BundleView, *, seed: int) -> Estimate:
         """One row per scan; NaN before the start and where the scan has no odometry.
@@ -54,12 +68,17 @@ class Amcl:
         Raises:
             NotApplicableError: no odometry, scans or map.
         """
+        if self.config.laser_model_type != "likelihood_field":
+            raise NotApplicableError("only runs with laser_model_type likelihood_field yet")
+        if self.config.motion_model != "differential" or self.config.squared_motion_noise:
+            raise NotApplicableError("only runs with nav2_amcl's differential model yet")
         scans = need_scans(view, self.name)
         odometry = need_odometry(view, self.name)
         grid = need_grid(view, self.name)
         T_odom_base = odometry.at(scans.t_ns).xyyaw
         known = np.flatnonzero(np.isfinite(T_odom_base).all(axis=1))
-        given = {start.row: start for start in starts(view, scans.t_ns, T_odom_base)}
+        told = self.config.initial_pose
+        given = {start.row: start for start in starts(view, scans.t_ns, T_odom_base, told)}
         if not given and len(known):
             given = {int(known[0]): Start(int(known[0]), None, DEFAULT_COV)}
         amcl = AmclFilter(self.config, grid, seed)

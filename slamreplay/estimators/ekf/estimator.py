@@ -7,7 +7,9 @@ from types import MappingProxyType
 from typing import ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
+from slamreplay.bundle.fixes import SatelliteFixes, fixes_in_map
 from slamreplay.bundle.run import Estimate, Innovations
 from slamreplay.bundle.scans import scan_set
 from slamreplay.bundle.sightings import sightings_of
@@ -16,9 +18,10 @@ from slamreplay.bundle.view import BundleView
 from slamreplay.errors import NotApplicableError
 from slamreplay.estimators.ekf import kernels
 from slamreplay.estimators.ekf.filter import filtered, gates_of
+from slamreplay.estimators.ekf.gyro import gyro_of
 from slamreplay.estimators.ekf.noise import Noise
-from slamreplay.estimators.ekf.observations import observations_of
-from slamreplay.estimators.ekf.passing import Evidence, Filtered
+from slamreplay.estimators.ekf.observations import Observations, after_motion, observations_of
+from slamreplay.estimators.ekf.passing import Evidence, Filtered, Held
 from slamreplay.estimators.ekf.tuning import tuned
 from slamreplay.estimators.inputs import need_odometry
 from slamreplay.estimators.start import DEFAULT_COV, GLOBAL, OFFSET, ROTATE, Start, starts
@@ -26,21 +29,24 @@ from slamreplay.estimators.start import DEFAULT_COV, GLOBAL, OFFSET, ROTATE, Sta
 #: Settings a perturbation may change: ratios of the covariances that the filter is told.
 PROCESS_NOISE, MEASUREMENT_NOISE = "process_noise_scale", "measurement_noise_scale"
 SETTINGS = frozenset({OFFSET, ROTATE, GLOBAL, PROCESS_NOISE, MEASUREMENT_NOISE})
-NEEDS = frozenset({"odometry", "sightings"})
 #: Axes of the innovations: what they measure and its unit.
 AXES = ("range m", "bearing rad", "heading rad")
+FIX_AXES, TURN_AXES = ("x m", "y m"), ("turn rad",)
 
 
 @dataclass(frozen=True)
 class Ekf:
-    """Carry the pose by odometry, and correct it by sightings of things with a surveyed place.
+    """Carry the pose by odometry and gyroscope, and correct it by what is seen of surveyed places.
 
-    It starts from the initial pose in the log, else from the first recorded belief; where there is
-    neither, and where it has been lost for some seconds, it places itself by the sightings alone.
+    That are tags, docks and reflectors that static transforms tie to the map, and satellite fixes
+    in a frame that they tie to it. It starts from the initial pose in the log, else from the first
+    recorded belief; where there is neither, and where it has been lost for some seconds, it places
+    itself by the sightings alone. Without a start and without sightings it carries odometry on from
+    zero, in the odometry's own frame. What each of its inputs came to is in the scalars.
 
     Attributes:
         noise: what it is told of its sensors.
-        gate_probability: with which it takes in a sighting that its model describes; others are
+        gate_probability: with which it takes in a measurement that its model describes; others are
             rejected by their NIS.
         update_min_d: a thing is taken in again after driving this far, m,
         update_min_a: or turning by this much, rad.
@@ -52,17 +58,19 @@ class Ekf:
     update_min_a: float = 0.01
 
     name: ClassVar[str] = "ekf"
-    needs: ClassVar[frozenset[str]] = NEEDS
+    needs: ClassVar[frozenset[str]] = frozenset({"odometry"})
     settings: ClassVar[frozenset[str]] = SETTINGS
 
     def run(self, view: BundleView, *, seed: int) -> Estimate:  # noqa: ARG002 - nothing is random
         """One row per scan (per odometry sample without scans), NaN where there is no pose.
 
-        Diagnostics: `updated` (1 where a sighting was taken in since the row before). Scalars:
-        sightings by what became of them, and how often the filter placed itself.
+        Diagnostics: `updated` (1 where a sighting or fix was taken in since the row before).
+        Scalars: measurements by what became of them, how often the filter placed itself, and the
+        bias of the gyroscope at the end, `gyro_bias`, rad/s.
 
         Raises:
-            NotApplicableError: no odometry, or no sighting of anything with a surveyed place.
+            NotApplicableError: no odometry; or it is to start anywhere, and has no sighting of
+                anything with a surveyed place.
         """
         evidence = evidence_of(view, self)
         done = filtered(evidence, self.noise, gates_of(self.gate_probability), *scales_of(view))
@@ -88,7 +96,7 @@ class EkfTuned:
 
     name: ClassVar[str] = "ekf_tuned"
     causal: ClassVar[bool] = False
-    needs: ClassVar[frozenset[str]] = NEEDS
+    needs: ClassVar[frozenset[str]] = frozenset({"odometry", "sightings"})
     settings: ClassVar[frozenset[str]] = SETTINGS
 
     def run(self, view: BundleView, *, seed: int) -> Estimate:  # noqa: ARG002 - nothing is random
@@ -98,8 +106,10 @@ class EkfTuned:
             NotApplicableError: no odometry, or no sighting of anything with a surveyed place.
         """
         gates = gates_of(self.gate_probability)
-        plain = replace(view, settings=MappingProxyType({}))
-        fit = tuned(evidence_of(plain, self), gates)
+        plain = evidence_of(replace(view, settings=MappingProxyType({})), self)
+        if not len(plain.observations):
+            raise _without_survey(self.name, sightings_of(view, plain.odometry) is None)
+        fit = tuned(plain, gates)
         evidence = evidence_of(view, self)
         estimate = estimate_of(
             view, evidence, filtered(evidence, fit.noise, gates, *scales_of(view))
@@ -115,26 +125,45 @@ def evidence_of(view: BundleView, estimator: Ekf | EkfTuned) -> Evidence:
     """What the filter reads of a view.
 
     Raises:
-        NotApplicableError: no odometry, or no sighting of anything with a surveyed place.
+        NotApplicableError: no odometry, or a start anywhere without a sighting of anything with a
+            surveyed place.
     """
     odometry = need_odometry(view, estimator.name)
     sightings = sightings_of(view, odometry)
-    if sightings is None or not sightings.surveyed:
-        what = "sightings of tags or docks" if sightings is None else "a survey of what it sighted"
-        hint = "static transforms from the map to the things say where they are"
-        raise NotApplicableError(
-            f"needs {what}, and the log has none", where=estimator.name, hint=hint
-        )
     scans = scan_set(view)
     row_ns = odometry.t_ns if scans is None else scans.t_ns
     T_odom_base = odometry.at(row_ns).xyyaw
     given = starts(view, row_ns, T_odom_base)
+    seen = Observations.none() if sightings is None else observations_of(sightings)
+    least = estimator.update_min_d, estimator.update_min_a
+    seen = seen.of_moving(odometry, *least)
     known = np.flatnonzero(np.isfinite(T_odom_base).all(axis=1))
-    if not given and len(known):
+    frame = view.manifest.frames.map or "map"
+    if not given and len(known) and len(seen):
         given = [Start(int(known[0]), None, DEFAULT_COV)]
-    seen = observations_of(sightings)
-    seen = seen.of_moving(odometry, estimator.update_min_d, estimator.update_min_a)
-    return Evidence(odometry, seen, row_ns, given)
+    elif not given and len(known):
+        frame, given = odometry.frame_id, [Start(int(known[0]), np.zeros(3), np.zeros((3, 3)))]
+    elif given and given[0].xyyaw is None and not len(seen):
+        raise _without_survey(estimator.name, sightings is None)
+    fixes = None if frame == odometry.frame_id else _of_moving(fixes_in_map(view), odometry, *least)
+    return Evidence(odometry, seen, row_ns, given, gyro_of(view), fixes, frame)
+
+
+def _without_survey(where: str, nothing_seen: bool) -> NotApplicableError:
+    what = "sightings of tags or docks" if nothing_seen else "a survey of what it sighted"
+    hint = "static transforms from the map to the things say where they are"
+    return NotApplicableError(f"needs {what}, and the log has none", where=where, hint=hint)
+
+
+def _of_moving(
+    fixes: SatelliteFixes | None, odometry: PoseTrack, least_m: float, least_rad: float
+) -> SatelliteFixes | None:
+    """Fixes that come after some motion: at rest a receiver errs the same way for minutes."""
+    if fixes is None:
+        return None
+    keep = after_motion(fixes.t_ns, np.zeros(len(fixes), dtype=np.int64), 1, odometry, least_m,
+                        least_rad)  # fmt: skip
+    return replace(fixes, t_ns=fixes.t_ns[keep], xy=fixes.xy[keep], cov=fixes.cov[keep])
 
 
 def scales_of(view: BundleView) -> tuple[float, float]:
@@ -144,13 +173,11 @@ def scales_of(view: BundleView) -> tuple[float, float]:
 
 def estimate_of(view: BundleView, evidence: Evidence, done: Filtered) -> Estimate:
     """The filter's rows, innovations and counts."""
-    frames = view.manifest.frames
-    base = frames.base or evidence.odometry.child_frame_id
-    track = PoseTrack(frames.map or "map", base, evidence.row_ns, done.xyyaw, done.cov)
+    base = view.manifest.frames.base or evidence.odometry.child_frame_id
+    track = PoseTrack(evidence.frame_id, base, evidence.row_ns, done.xyyaw, done.cov)
     seen = evidence.observations
     scalars = {
-        "sightings_accepted": float((done.status == kernels.ACCEPTED).sum()),
-        "sightings_rejected": float((done.status == kernels.REJECTED).sum()),
+        **_counts("sightings", done.sighted),
         "sightings_before_start": float((done.status == kernels.UNUSED).sum()) - done.silent,
         "sightings_without_odometry": float(done.silent),
         "sightings_without_survey": float(seen.unsurveyed),
@@ -158,26 +185,61 @@ def estimate_of(view: BundleView, evidence: Evidence, done: Filtered) -> Estimat
         "located_by_sightings": float(done.located),
         "recoveries": float(done.recoveries),
     }
-    return Estimate(track, _innovations(evidence, done), {"updated": done.updated}, scalars)
+    if evidence.fixes is not None:
+        scalars |= _counts("fixes", done.fixed)
+    if evidence.gyro is not None:
+        scalars |= {**_counts("wheel_turns", done.turned), "gyro_bias": done.bias}
+    innovations = _innovations(evidence, done, track.frame_id, base)
+    return Estimate(track, innovations, {"updated": done.updated}, scalars)
 
 
-def _innovations(evidence: Evidence, done: Filtered) -> tuple[Innovations, ...]:
-    """A set for each kind of thing and number of axes: "fiducial", "fiducial with heading"."""
+def _counts(what: str, held: Held) -> dict[str, float]:
+    return {
+        f"{what}_accepted": float((held.status == kernels.ACCEPTED).sum()),
+        f"{what}_rejected": float((held.status == kernels.REJECTED).sum()),
+    }
+
+
+def _innovations(
+    evidence: Evidence, done: Filtered, frame: str, base: str
+) -> tuple[Innovations, ...]:
+    """A set for each kind of thing and number of axes, for fixes, and for the wheels' turns."""
     seen = evidence.observations
     used = done.status != kernels.UNUSED
     sets = []
     for kind in sorted(set(seen.kind.tolist())):
         for m in (2, 3):
             rows = np.flatnonzero(used & (seen.kind == kind) & (seen.dims == m))
-            if len(rows):
-                sets.append(
-                    Innovations(
-                        kind if m == 2 else f"{kind} with heading",
-                        seen.t_ns[rows],
-                        done.residual[rows, :m],
-                        done.S[rows, :m, :m],
-                        done.status[rows] == kernels.ACCEPTED,
-                        AXES[:m],
-                    )
-                )
-    return tuple(sets)
+            source = kind if m == 2 else f"{kind} with heading"
+            about = seen.names[seen.thing[rows]]
+            sets.append(_set(source, done.sighted, rows, AXES[:m], base, about))
+    if evidence.fixes is not None:
+        rows = np.flatnonzero(done.fixed.status != kernels.UNUSED)
+        about = np.full(len(rows), evidence.fixes.topic)
+        sets.append(_set("gnss", done.fixed, rows, FIX_AXES, frame, about))
+    rows = np.flatnonzero(done.turned.status != kernels.UNUSED)
+    wheels = np.full(len(rows), evidence.odometry.frame_id)
+    sets.append(_set("odometry", done.turned, rows, TURN_AXES, base, wheels))
+    return tuple(one for one in sets if len(one.t_ns))
+
+
+def _set(
+    source: str,
+    held: Held,
+    rows: NDArray[np.int64],
+    axes: tuple[str, ...],
+    frame: str,
+    about: NDArray[np.str_],
+) -> Innovations:
+    m = len(axes)
+    return Innovations(
+        source,
+        held.t_ns[rows],
+        held.residual[rows, :m],
+        held.S[rows, :m, :m],
+        held.status[rows] == kernels.ACCEPTED,
+        axes,
+        frame,
+        held.moved[rows],
+        about,
+    )

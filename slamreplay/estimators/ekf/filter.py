@@ -13,7 +13,7 @@ from slamreplay.estimators.ekf import kernels
 from slamreplay.estimators.ekf.consensus import LEAST_AGREEING, locate, window_of
 from slamreplay.estimators.ekf.motion import Motion, Steps
 from slamreplay.estimators.ekf.noise import Noise
-from slamreplay.estimators.ekf.passing import Evidence, Filtered
+from slamreplay.estimators.ekf.passing import Evidence, Filtered, Held
 from slamreplay.estimators.start import Start
 from slamreplay.geometry import se2
 from slamreplay.geometry.times import NS_PER_S
@@ -32,12 +32,18 @@ _NEVER = np.iinfo(np.int64).min
 
 @dataclass(frozen=True, eq=False)
 class _Events:
-    """E moments in order of time, each a sighting or a row (the other index is -1)."""
+    """E moments in order of time, each a sighting, a fix or a row (the other indices are -1).
+
+    `turns` and `turn_variance` (E,) are the gyroscope's from the event before, NaN without it.
+    """
 
     t_ns: NDArray[np.int64]
     steps: Steps
+    turns: se2.Array
+    turn_variance: se2.Array
     sighting: NDArray[np.int64]
     row: NDArray[np.int64]
+    fix: NDArray[np.int64]
 
     def __len__(self) -> int:
         return len(self.t_ns)
@@ -45,7 +51,7 @@ class _Events:
 
 @dataclass(eq=False)
 class _State:
-    """Pose and lasting errors, whose these are, and `lost` as the kernel keeps it."""
+    """Pose, lasting errors and bias, whose errors these are, and `lost` as the kernel keeps it."""
 
     x: se2.Array
     P: se2.Array
@@ -54,12 +60,18 @@ class _State:
     lost: NDArray[np.int64] = field(default_factory=lambda: np.zeros(3, dtype=np.int64))
 
     @classmethod
-    def at(cls, pose: se2.Array, cov: se2.Array, lasting: se2.Array) -> _State:
+    def at(
+        cls, pose: se2.Array, cov: se2.Array, lasting: se2.Array, bias: tuple[float, float] | None
+    ) -> _State:
+        """At a pose, with nothing known of lasting errors, and a bias (rad/s) with its variance."""
         slots = SLOTS if lasting.any() else 0
-        x, P = np.zeros(3 + 2 * slots), np.zeros((3 + 2 * slots, 3 + 2 * slots))
+        n = 3 + 2 * slots + (bias is not None)
+        x, P = np.zeros(n), np.zeros((n, n))
         x[:3], P[:3, :3] = pose, cov
-        errors = np.arange(3, len(x))
+        errors = np.arange(3, 3 + 2 * slots)
         P[errors, errors] = np.tile(lasting, slots)
+        if bias is not None:
+            x[-1], P[-1, -1] = bias
         nobody = np.full(slots, -1, dtype=np.int64)
         return cls(x, P, nobody, nobody.copy())
 
@@ -93,8 +105,8 @@ def filtered(
         noise: the settings.
         gates: (4,) see `gates_of`.
         process_scale: ratio by which the covariance of motion is multiplied.
-        measurement_scale: ratio for that of sightings, their lasting errors and the sensor's mount
-            included.
+        measurement_scale: ratio for that of sightings and fixes, lasting errors and the sensor's
+            mount included.
         motion: of this odometry without these constant errors, where it is at hand.
     """
     motion = Motion(evidence.odometry, noise) if motion is None else motion
@@ -112,6 +124,7 @@ def filtered(
             event, state = this.search(event, end)
         else:
             event = this.follow(state, event, end, starts=start is not None)
+            this.remember(state)
             if event < end:
                 state = this.recovered(event - 1) or state
     return this.out()
@@ -129,7 +142,7 @@ class _Pass:
         process_scale: float,
         measurement_scale: float,
     ) -> None:
-        seen, N, M = evidence.observations, len(evidence.row_ns), len(evidence.observations)
+        seen, N = evidence.observations, len(evidence.row_ns)
         self.evidence, self.motion, self.noise, self.gates = evidence, motion, noise, gates
         self.events, self.silent = _events(evidence, motion, noise, process_scale)
         self.process_scale = process_scale
@@ -138,8 +151,18 @@ class _Pass:
         lasting = np.array([noise.lasting_range_per_m, noise.lasting_bearing_rad]) ** 2
         self.lasting = measurement_scale * lasting
         self.xyyaw, self.cov = np.full((N, 3), np.nan), np.full((N, 3, 3), np.nan)
-        self.updated, self.status = np.full(N, np.nan), np.zeros(M, dtype=np.int64)
-        self.residual, self.S = np.full((M, 3), np.nan), np.full((M, 3, 3), np.nan)
+        self.updated = np.full(N, np.nan)
+        self.sighted = Held.none(seen.t_ns, 3)
+        no_fix = np.empty(0, dtype=np.int64)
+        fixes = evidence.fixes
+        self.fixed = Held.none(no_fix if fixes is None else fixes.t_ns, 2)
+        self.fixed_xy = np.empty((0, 2)) if fixes is None else fixes.xy
+        fixed_R = np.empty((0, 2, 2)) if fixes is None else fixes.cov
+        self.fixed_R = measurement_scale * fixed_R
+        self.antenna = np.zeros(2) if fixes is None else fixes.antenna_xy
+        self.turned = Held.none(self.events.t_ns, 1)
+        self.turn_out = np.full((len(self.events), 2), np.nan)
+        self.bias = None if evidence.gyro is None else (0.0, noise.gyro_bias**2)
         mount = np.diag([noise.mount_m, noise.mount_m, noise.mount_rad]) ** 2
         self.mount = measurement_scale * mount
         self.retry_ns, self.located, self.recoveries = _NEVER, 0, 0
@@ -149,7 +172,12 @@ class _Pass:
         self.retry_ns = _NEVER
         if start.xyyaw is None:
             return None
-        return _State.at(start.xyyaw, start.cov, self.lasting)
+        return _State.at(start.xyyaw, start.cov, self.lasting, self.bias)
+
+    def remember(self, state: _State) -> None:
+        """Keep the bias that has been found: a robot that is lost still has the same gyroscope."""
+        if self.bias is not None:
+            self.bias = float(state.x[-1]), float(state.P[-1, -1])
 
     def search(self, first: int, end: int) -> tuple[int, _State | None]:
         """The state at the first event from which sightings tell it, and the event after that."""
@@ -172,19 +200,25 @@ class _Pass:
         return int(
             kernels.run(
                 first, end, starts, events.t_ns, events.steps.xyyaw, events.steps.Q,
-                events.sighting, events.row, self.polar, self.R, seen.dims, seen.thing,
-                seen.places, self.gates, self.lasting, self.noise.lasting_s,
-                np.array([LOST_LEAST, LOST_NS]), self.retry_ns, state.x, state.P, state.holder,
-                state.seen, state.lost, self.xyyaw, self.cov, self.updated, self.residual, self.S,
-                self.status,
+                events.turns, events.turn_variance, events.sighting, events.row, events.fix,
+                self.polar, self.R, seen.dims, seen.thing, seen.places, self.fixed_xy,
+                self.fixed_R, self.antenna, self.gates, self.lasting, self.noise.lasting_s,
+                self.noise.gyro_bias_per_root_s**2, np.array([LOST_LEAST, LOST_NS]),
+                self.retry_ns, state.x, state.P, state.holder, state.seen, state.lost, self.xyyaw,
+                self.cov, self.updated, *_arrays(self.sighted), *_arrays(self.fixed),
+                self.turn_out, self.turned.status, self.turned.moved,
             )
         )  # fmt: skip
 
     def out(self) -> Filtered:
         """What has been filled in."""
+        turned = self.turned
+        residual, S = self.turn_out[:, :1], self.turn_out[:, 1:, None]
+        turned = Held(turned.t_ns, residual, S, turned.status, turned.moved)
         return Filtered(
-            self.xyyaw, self.cov + self.mount, self.updated, self.residual, self.S, self.status,
-            self.located, self.recoveries, self.silent,
+            self.xyyaw, self.cov + self.mount, self.updated, self.sighted, self.fixed, turned,
+            np.nan if self.bias is None else self.bias[0], self.located, self.recoveries,
+            self.silent,
         )  # fmt: skip
 
     def _located(self, event: int) -> _State | None:
@@ -213,29 +247,41 @@ class _Pass:
         )  # fmt: skip
         if found is None:
             return None
-        state = _State.at(*found, self.lasting)
+        state = _State.at(*found, self.lasting, self.bias)
         state.lost[2] = 1
         self.located += 1
         return state
 
 
+def _arrays(held: Held) -> tuple[se2.Array, se2.Array, NDArray[np.int64], se2.Array]:
+    return held.residual, held.S, held.status, held.moved
+
+
 def _events(
     evidence: Evidence, motion: Motion, noise: Noise, process_scale: float
 ) -> tuple[_Events, int]:
-    """Events at which odometry is known, and how many sightings came at other times."""
-    M = len(evidence.observations)
-    t_ns = np.concatenate([evidence.observations.t_ns, evidence.row_ns])
+    """Events at which odometry is known, and how many sightings and fixes came at other times."""
+    fixed_ns = evidence.row_ns[:0] if evidence.fixes is None else evidence.fixes.t_ns
+    M, F = len(evidence.observations), len(fixed_ns)
+    t_ns = np.concatenate([evidence.observations.t_ns, fixed_ns, evidence.row_ns])
     known = motion.known(t_ns, noise)
     order = np.argsort(t_ns, kind="stable")  # at equal times sightings come before rows
     order = order[known[order]]
-    steps = motion.steps(t_ns[order], noise)
+    at_ns = t_ns[order]
+    steps = motion.steps(at_ns, noise)
+    turns, turn_variance = np.full(len(order), np.nan), np.full(len(order), np.nan)
+    if evidence.gyro is not None:
+        turns, turn_variance = evidence.gyro.between(at_ns, noise)
     events = _Events(
-        t_ns[order],
+        at_ns,
         Steps(steps.xyyaw, process_scale * steps.Q),
+        turns,
+        process_scale * turn_variance,
         np.where(order < M, order, -1),
-        np.where(order >= M, order - M, -1),
+        np.where(order >= M + F, order - M - F, -1),
+        np.where((order >= M) & (order < M + F), order - M, -1),
     )
-    return events, int((~known[:M]).sum())
+    return events, int((~known[: M + F]).sum())
 
 
 def _starts_by_event(evidence: Evidence, events: _Events) -> dict[int, Start]:

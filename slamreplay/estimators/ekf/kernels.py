@@ -1,8 +1,9 @@
 """The filter's loop over events, compiled; tests hold each step against estimators.kalman.
 
-The state is x, y, yaw and, for each of the `slots`, the lasting errors of one thing: of its range
-(as a share of it) and of its bearing. A thing that is seen again takes its own slot, a new one a
-free slot or the one not seen for longest.
+The state is x, y, yaw; for each of the `slots` the lasting errors of one thing: of its range (as a
+share of it) and of its bearing; and last, where there is one, the bias of the gyroscope in rad/s.
+A thing that is seen again takes its own slot, a new one a free slot or the one not seen for
+longest.
 
 One module, longer than most: numba keeps a compiled caller though a function that it calls from
 another file has changed.
@@ -13,11 +14,14 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-#: What became of a sighting.
+#: What became of a measurement.
 UNUSED, ACCEPTED, REJECTED = 0, 1, 2
 #: A thing nearer than this has no bearing, m.
 NEAREST_M = 0.05
 _TWO_PI = 2.0 * np.pi
+#: A turn of the wheels that the gyroscope contradicts is given this many times the squared gap as
+#: its variance.
+_CONTRADICTED = 100.0
 
 
 @njit(cache=True)
@@ -80,20 +84,80 @@ def predict(x, P, step, Q):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def fade(x, P, keep, variance):  # type: ignore[no-untyped-def]
+def fade(x, P, end, keep, variance):  # type: ignore[no-untyped-def]
     """Let lasting errors forget, in place: each keeps a share `keep` of itself, in [0, 1].
 
-    `variance` (2,) is what the errors of range and bearing have without any sighting.
+    They are the states from 3 to `end`; `variance` (2,) is what the errors of range and bearing
+    have without any sighting.
     """
-    n = len(x)
-    for i in range(3, n):
+    for i in range(3, end):
         x[i] *= keep
         for j in range(3):
             P[i, j] *= keep
             P[j, i] *= keep
-        for j in range(3, n):
+        for j in range(end, len(x)):
+            P[i, j] *= keep
+            P[j, i] *= keep
+        for j in range(3, end):
             P[i, j] *= keep * keep
         P[i, i] += (1.0 - keep * keep) * variance[(i - 3) % 2]
+
+
+@njit(cache=True)
+def turn_by_gyro(x, P, yaw, step, Q, turned, variance, dt, gate, out):  # type: ignore[no-untyped-def]
+    """Hold the turn of the wheels in a step against the gyroscope's, and take both in, in place.
+
+    The step has been predicted already, so the noise of its turn is part of the error of the state
+    and of the innovation: a Kalman filter with correlated noises (Bar-Shalom, Li, Kirubarajan 2001,
+    chapter 8). Where the two contradict each other the gyroscope is believed, for wheels slip
+    (gyrodometry, Borenstein and Feng 1996), and the way of that step is as uncertain as it is long.
+
+    Args: state and covariance as `predict` left them, the heading before, the step (3,) with its
+    covariance Q (3, 3), the gyroscope's integral `turned` over `dt` seconds and its variance, bias
+    apart, and the largest NIS of wheels that agree. `out` (2,) becomes residual (wheels minus
+    gyroscope) and its variance. Returns ACCEPTED or REJECTED, of the turn of the wheels.
+    """
+    n = len(x)
+    b = n - 1
+    gap = wrapped(step[2] - (turned - x[b] * dt))
+    S = Q[2, 2] + dt * dt * P[b, b] + variance
+    out[0], out[1] = gap, S
+    cos, sin = np.cos(yaw), np.sin(yaw)
+    cross = np.zeros(n)
+    cross[0] = cos * Q[0, 2] - sin * Q[1, 2]
+    cross[1] = sin * Q[0, 2] + cos * Q[1, 2]
+    cross[2] = Q[2, 2]
+    status = ACCEPTED
+    if gap * gap > gate * S:
+        status = REJECTED
+        S += _CONTRADICTED * gap * gap
+        cross[2] += _CONTRADICTED * gap * gap
+        P[2, 2] += _CONTRADICTED * gap * gap
+        dx, dy = cos * step[0] - sin * step[1], sin * step[0] + cos * step[1]
+        P[0, 0] += dx * dx
+        P[0, 1] += dx * dy
+        P[1, 0] += dx * dy
+        P[1, 1] += dy * dy
+    for i in range(n):
+        cross[i] += P[i, b] * dt
+    for i in range(n):
+        x[i] -= cross[i] / S * gap
+    x[2] = wrapped(x[2])
+    for i in range(n):
+        for j in range(n):
+            P[i, j] -= cross[i] * cross[j] / S
+    return status
+
+
+@njit(cache=True)
+def of_point(x, lever, H, expected):  # type: ignore[no-untyped-def]
+    """Where a point at `lever` (2,) in the base should be: fills in `expected` (2,), H (2, n)."""
+    H[:, :] = 0.0
+    cos, sin = np.cos(x[2]), np.sin(x[2])
+    off_x, off_y = cos * lever[0] - sin * lever[1], sin * lever[0] + cos * lever[1]
+    expected[0], expected[1] = x[0] + off_x, x[1] + off_y
+    H[0, 0], H[0, 2] = 1.0, -off_y
+    H[1, 1], H[1, 2] = 1.0, off_x
 
 
 @njit(cache=True)
@@ -259,46 +323,52 @@ def slot_of(thing, holder, seen, x, P, variance):  # type: ignore[no-untyped-def
 
 
 @njit(cache=True)
-def take_in(s, slot, place, sensed, R, m, gate, x, P, H, HP, S, L, residual_out, S_out):  # type: ignore[no-untyped-def]
-    """Hold sighting `s` against the state, and correct it where its NIS is within the gate.
+def take_in(k, m, gate, R, residual, x, P, H, HP, S, L, residual_out, S_out, moved_out):  # type: ignore[no-untyped-def]
+    """Correct the state by measurement `k`, of which H and residual are known, within its gate.
 
-    Writes residual and S of the prior to row `s` of the outputs; returns ACCEPTED or REJECTED.
+    Writes residual and S of the prior, and how far the pose moves, to row `k` of the outputs;
+    returns ACCEPTED or REJECTED.
     """
-    expected, residual = np.zeros(3), np.zeros(3)
-    measurement(x, place, slot, m, H, expected)
+    innovate(P, H, R, m, HP, S)
     for r in range(m):
-        residual[r] = sensed[s, r] - expected[r]
-        if r > 0:
-            residual[r] = wrapped(residual[r])
-    innovate(P, H, R[s], m, HP, S)
-    for r in range(m):
-        residual_out[s, r] = residual[r]
+        residual_out[k, r] = residual[r]
         for c in range(m):
-            S_out[s, r, c] = S[r, c]
+            S_out[k, r, c] = S[r, c]
+    moved_out[k, :] = 0.0
     if not lower(S, m, L) or squared(L, residual, m) > gate:
         return REJECTED
-    correct(x, P, H, R[s], m, HP, L, residual)
+    before_x, before_y, before_yaw = x[0], x[1], x[2]
+    correct(x, P, H, R, m, HP, L, residual)
+    moved_out[k, 0], moved_out[k, 1] = x[0] - before_x, x[1] - before_y
+    moved_out[k, 2] = wrapped(x[2] - before_yaw)
     return ACCEPTED
 
 
 @njit(cache=True)
-def run(  # type: ignore[no-untyped-def]
+def run(  # type: ignore[no-untyped-def]  # noqa: C901 - the filter's loop
     first,
     last,
     starts,
     t_ns,
     steps,
     Q,
+    turns,
+    turn_variance,
     sighting,
     row,
+    fix,
     sensed,
     R,
     dims,
     things,
     places,
+    fixed_xy,
+    fixed_R,
+    antenna,
     gates,
     lasting,
     lasting_s,
+    bias_walk,
     patience,
     retry_ns,
     x,
@@ -312,6 +382,14 @@ def run(  # type: ignore[no-untyped-def]
     residual_out,
     S_out,
     status_out,
+    moved_out,
+    fix_residual_out,
+    fix_S_out,
+    fix_status_out,
+    fix_moved_out,
+    turn_out,
+    turn_status_out,
+    turn_moved_out,
 ):
     """Run events first to last - 1; returns the first event not run, which is `last` in the end.
 
@@ -319,35 +397,75 @@ def run(  # type: ignore[no-untyped-def]
     least `patience[0]` of them were rejected, not before `retry_ns`.
 
     Args: `starts` says that the state is already that at the first event, and not at the one
-    before it. Of the events (E,): t_ns, steps (E, 3) and Q (E, 3, 3) from the one before,
-    `sighting` and `row` the index of what happens there or -1. Of the sightings (M,): `sensed`
-    (M, 3), R (M, 3, 3), dims, things, and places (T, 3) of the things; `gates` (4,) the largest
-    NIS for each dimension. `lasting` (2,) variances of lasting errors, `lasting_s` their time
-    constant. The state x (n,), P (n, n), `holder` and `seen` (slots,), `lost` (3,): number and
-    first time of the rejections in a row, and whether a sighting was taken in since the last row.
-    Outputs are filled in by row and by sighting; they and the state change in place.
+    before it. Of the events (E,): t_ns, steps (E, 3) and Q (E, 3, 3) from the one before, `turns`
+    (E,) of the gyroscope from the one before (NaN: none) and their variance `turn_variance` (E,);
+    `sighting`, `row` and `fix` the index of what happens there or -1. Of the sightings (M,):
+    `sensed` (M, 3), R (M, 3, 3), dims, things, and places (T, 3) of the things. Of the fixes
+    (F,): `fixed_xy` (F, 2), `fixed_R` (F, 2, 2), and the `antenna` (2,) in the base. `gates` (4,)
+    the largest NIS for each dimension. `lasting` (2,) variances of lasting errors, `lasting_s`
+    their time constant; `bias_walk` variance of the bias after a second. The state x (n,),
+    P (n, n), `holder` and `seen` (slots,), `lost` (3,): number and first time of the rejections in
+    a row, and whether anything was taken in since the last row. Outputs are filled in by row, by
+    sighting, by fix, and by event (`turn_*`); they and the state change in place.
     """
     n = len(x)
+    end = 3 + 2 * len(holder)
     H, HP, S, L = np.zeros((3, n)), np.zeros((3, n)), np.zeros((3, 3)), np.zeros((3, 3))
+    expected, residual, before = np.zeros(3), np.zeros(3), np.zeros(3)
     for e in range(first, last):
         if e > first or not starts:
+            yaw = x[2]
             predict(x, P, steps[e], Q[e])
-            if n > 3 and t_ns[e] > t_ns[e - 1]:
-                fade(x, P, np.exp((t_ns[e - 1] - t_ns[e]) * 1e-9 / lasting_s), lasting)
-        s, k = sighting[e], row[e]
+            if end > 3 and t_ns[e] > t_ns[e - 1]:
+                fade(x, P, end, np.exp((t_ns[e - 1] - t_ns[e]) * 1e-9 / lasting_s), lasting)
+            if n > end and t_ns[e] > t_ns[e - 1]:
+                dt = (t_ns[e] - t_ns[e - 1]) * 1e-9
+                P[n - 1, n - 1] += bias_walk * dt
+                if np.isfinite(turns[e]):
+                    before[:] = x[:3]
+                    turn_status_out[e] = turn_by_gyro(
+                        x,
+                        P,
+                        yaw,
+                        steps[e],
+                        Q[e],
+                        turns[e],
+                        turn_variance[e],
+                        dt,
+                        gates[1],
+                        turn_out[e],
+                    )
+                    turn_moved_out[e] = x[:3] - before
+                    turn_moved_out[e, 2] = wrapped(turn_moved_out[e, 2])
+        s, k, f = sighting[e], row[e], fix[e]
         if k >= 0:
             xyyaw_out[k] = x[:3]
             cov_out[k] = P[:3, :3]
             updated_out[k] = lost[2]
             lost[2] = 0
+        if f >= 0:
+            of_point(x, antenna, H, expected)
+            for r in range(2):
+                residual[r] = fixed_xy[f, r] - expected[r]
+            fix_status_out[f] = take_in(
+                f, 2, gates[2], fixed_R[f], residual, x, P, H, HP, S, L, fix_residual_out,
+                fix_S_out, fix_moved_out,
+            )  # fmt: skip
+            if fix_status_out[f] == ACCEPTED:
+                lost[0], lost[2] = 0, 1
         if s < 0:
             continue
         slot = slot_of(things[s], holder, seen, x, P, lasting)
         if slot > 0:
             seen[(slot - 3) // 2] = e
-        m, place = dims[s], places[things[s]]
+        m = dims[s]
+        measurement(x, places[things[s]], slot, m, H, expected)
+        for r in range(m):
+            residual[r] = sensed[s, r] - expected[r]
+            if r > 0:
+                residual[r] = wrapped(residual[r])
         status_out[s] = take_in(
-            s, slot, place, sensed, R, m, gates[m], x, P, H, HP, S, L, residual_out, S_out
+            s, m, gates[m], R[s], residual, x, P, H, HP, S, L, residual_out, S_out, moved_out
         )
         if status_out[s] == ACCEPTED:
             lost[0], lost[2] = 0, 1

@@ -41,6 +41,12 @@ class Noise:
         lasting_range_per_m: of the lasting error of the ranges to one thing, per metre; 0: none.
         lasting_bearing_rad: of the lasting error of the bearings of one thing, rad; 0: none.
         lasting_s: time constant with which lasting errors change, s.
+        gyro_per_root_s: of the integral of a gyroscope after one second, rad (angle random walk),
+            beside what the log states of its rates,
+        gyro_per_turn: after turning by 1 rad, rad: its scale,
+        gyro_clock_s: of its clock against the odometry's, s.
+        gyro_bias: of its bias at the start, rad/s,
+        gyro_bias_per_root_s: and of what that changes by in one second, rad/s.
         mount_m: of where the sensor sits on the base, along each axis, m,
         mount_rad: and of how it is turned, rad. The filter follows the sensor and no sighting
             tells these: they are added to the covariance that it gives out, never fitted. 0 by
@@ -71,6 +77,11 @@ class Noise:
     lasting_range_per_m: float = 0.0
     lasting_bearing_rad: float = 0.0
     lasting_s: float = 5.0
+    gyro_per_root_s: float = 0.001
+    gyro_per_turn: float = 0.01
+    gyro_clock_s: float = 0.02
+    gyro_bias: float = 0.03
+    gyro_bias_per_root_s: float = 1e-4
     mount_m: float = 0.0
     mount_rad: float = 0.0
     range_ratio: float = 1.0

@@ -32,6 +32,7 @@ class Observations:
         polar: (M, 3) range m, bearing rad, heading rad in the base, as sensed.
         dims: (M,) 3 where the heading was sensed and is surveyed, else 2.
         stated: (M, 3, 3) covariance of `polar` that the log states, NaN where it does not.
+        names: (T,) of the things.
         unsurveyed: sightings of things without a survey, which are left out.
         repeated: sightings of a thing without any motion since the last one, left out too.
     """
@@ -44,7 +45,15 @@ class Observations:
     dims: NDArray[np.int64]
     stated: se2.Array
     unsurveyed: int
+    names: NDArray[np.str_]
     repeated: int = 0
+
+    @classmethod
+    def none(cls) -> Observations:
+        """Of nothing."""
+        no, pose, cov = np.empty(0, dtype=np.int64), np.empty((0, 3)), np.empty((0, 3, 3))
+        kind, names = np.empty(0, dtype=object), np.empty(0, dtype="U1")
+        return cls(no, kind, no, pose, pose, no, cov, 0, names)
 
     def __len__(self) -> int:
         return len(self.t_ns)
@@ -60,6 +69,7 @@ class Observations:
             self.dims[index],
             self.stated[index],
             self.unsurveyed,
+            self.names,
             self.repeated,
         )
 
@@ -74,13 +84,7 @@ class Observations:
             least_m: a thing counts again after driving this far,
             least_rad: or turning by this much.
         """
-        step = np.diff(odometry.xyyaw, axis=0, prepend=odometry.xyyaw[:1])
-        driven = np.cumsum(np.hypot(step[:, 0], step[:, 1]))
-        turned = np.cumsum(np.abs(se2.wrap_angle(step[:, 2])))
-        at_ns = self.t_ns - odometry.t_ns[0]
-        driven, turned = (np.interp(at_ns, odometry.t_ns - odometry.t_ns[0], d)
-                          for d in (driven, turned))  # fmt: skip
-        keep = kernels.of_moving(self.thing, len(self.places), driven, turned, least_m, least_rad)
+        keep = after_motion(self.t_ns, self.thing, len(self.places), odometry, least_m, least_rad)
         return replace(self.take(keep), repeated=int((~keep).sum()))
 
     def corrected(self, noise: Noise) -> se2.Array:
@@ -114,6 +118,33 @@ class Observations:
         return scale * (R + _FINEST)
 
 
+def after_motion(
+    t_ns: NDArray[np.int64],
+    thing: NDArray[np.int64],
+    count: int,
+    odometry: PoseTrack,
+    least_m: float,
+    least_rad: float,
+) -> NDArray[np.bool_]:
+    """(M,) which measurements come after some motion since the last one of the same thing.
+
+    Args:
+        t_ns: (M,) when, sorted.
+        thing: (M,) of what, below `count`.
+        count: of things.
+        odometry: base in odom.
+        least_m: driving this far is some motion,
+        least_rad: or turning by this much.
+    """
+    step = np.diff(odometry.xyyaw, axis=0, prepend=odometry.xyyaw[:1])
+    driven = np.cumsum(np.hypot(step[:, 0], step[:, 1]))
+    turned = np.cumsum(np.abs(se2.wrap_angle(step[:, 2])))
+    at_ns, own_ns = t_ns - odometry.t_ns[0], odometry.t_ns - odometry.t_ns[0]
+    driven, turned = np.interp(at_ns, own_ns, driven), np.interp(at_ns, own_ns, turned)
+    keep = kernels.of_moving(thing, count, driven, turned, least_m, least_rad)
+    return np.asarray(keep)
+
+
 def observations_of(sightings: Sightings) -> Observations:
     """The sightings of surveyed things; the others are counted.
 
@@ -143,4 +174,5 @@ def observations_of(sightings: Sightings) -> Observations:
         np.where(turned, 3, 2).astype(np.int64),
         stated,
         int((~surveyed).sum()),
+        names,
     )

@@ -8,7 +8,8 @@ from matplotlib.figure import Figure
 
 from slamreplay.consistency.answers import P_ACCUSE
 from slamreplay.consistency.statistics.mean_test import N_EFF_MIN, NOMINAL
-from slamreplay.labs.interval_calibration.trials import Cell, share_interval
+from slamreplay.labs.interval_calibration.trials import Cell
+from slamreplay.labs.intervals import share_interval
 from slamreplay.labs.lab import LabResults, ResultTable
 from slamreplay.report.figures.calibration import Curve, calibration_figure
 

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.signal import lfilter
-from scipy.special import bdtri
 
 from slamreplay.consistency.answers import P_ACCUSE
 from slamreplay.consistency.statistics.intervals import mean_interval
 from slamreplay.consistency.statistics.mean_test import NOMINAL, mean_test
 from slamreplay.geometry.se2 import Array
+from slamreplay.labs.intervals import share_interval
 
 
 @dataclass(frozen=True)
@@ -140,13 +140,6 @@ def _count(
         naive=sum(t.mean is not None and not low <= t.mean <= high for t in tests),
         estimated=float(np.median([t.n_eff for t in tests])),
     )
-
-
-def share_interval(hits: int, n: int) -> tuple[float, float]:
-    """95 % interval of a share (Clopper and Pearson 1934, Biometrika 26, 404-413)."""
-    low = 0.0 if hits == 0 else float(bdtri(hits - 1, n, 0.975))
-    high = 1.0 if hits == n else float(bdtri(hits, n, 0.025))
-    return low, high
 
 
 def remembering(rng: np.random.Generator, rows: int, rho: float, dof: int) -> Array:

@@ -11,7 +11,7 @@ import yaml
 
 from slamreplay.errors import UsageError
 
-#: A recipe is a page; more is another file, or an attack.
+#: A page of settings; more is another file, or an attack.
 MAX_BYTES, MAX_DEPTH = 100_000, 20
 
 # Scalars of YAML 1.2's core schema (section 10.3.2), without octal and hexadecimal numbers. PyYAML
@@ -26,15 +26,23 @@ _NUMBER = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?")
 _NOT_FINITE = re.compile(r"[-+]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)")
 
 
-def read_plain_yaml(path: Path) -> dict[str, Any]:
+def read_plain_yaml(
+    path: Path, *, kind: str, hint: str, max_bytes: int = MAX_BYTES
+) -> dict[str, Any]:
     """The keys of a YAML file that holds one mapping.
 
     Aliases (a few lines of them can stand for gigabytes), tags and keys given twice are refused.
 
+    Args:
+        path: the file.
+        kind: what it is, for errors: "recipe".
+        hint: how such a file begins, for one that holds no mapping.
+        max_bytes: more than this is no such file.
+
     Raises:
-        UsageError: the file cannot be read, is no such YAML, or is larger than a page may be.
+        UsageError: the file cannot be read, is no such YAML, or is too large.
     """
-    text = _text(path)
+    text = _text(path, kind, max_bytes)
     try:
         given = _document(yaml.parse(text, Loader=yaml.SafeLoader))
     except yaml.MarkedYAMLError as error:
@@ -44,23 +52,21 @@ def read_plain_yaml(path: Path) -> dict[str, Any]:
     except yaml.YAMLError as error:
         raise UsageError(f"not YAML: {str(error).splitlines()[0]}", where=path) from error
     if not isinstance(given, dict):
-        raise UsageError(
-            "a recipe holds lines of KEY: VALUE", where=path, hint="begin with version: 1"
-        )
+        raise UsageError(f"a {kind} holds lines of KEY: VALUE", where=path, hint=hint)
     return given
 
 
-def _text(path: Path) -> str:
+def _text(path: Path, kind: str, max_bytes: int) -> str:
     try:
         if path.exists() and not path.is_file():  # a pipe would wait for ever
-            raise UsageError("not a file", where=path, hint="name the recipe.yaml itself")
+            raise UsageError("not a file", where=path, hint=f"name the {kind}.yaml itself")
         with path.open("rb") as stream:
-            content = stream.read(MAX_BYTES + 1)
+            content = stream.read(max_bytes + 1)
     except (OSError, ValueError) as error:  # ValueError: a zero byte in the name
         why = getattr(error, "strerror", None) or error
-        raise UsageError(f"cannot read the recipe: {why}", where=path) from error
-    if len(content) > MAX_BYTES:
-        raise UsageError(f"larger than {MAX_BYTES} bytes, so not a recipe", where=path)
+        raise UsageError(f"cannot read the {kind}: {why}", where=path) from error
+    if len(content) > max_bytes:
+        raise UsageError(f"larger than {max_bytes} bytes, so not a {kind}", where=path)
     try:
         return content.decode("utf-8-sig")
     except UnicodeDecodeError as error:

@@ -1,0 +1,31 @@
+"""A recording as a bundle that lives in memory."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from slamreplay.bundle.schema import TABLES
+from slamreplay.bundle.view import Bundle
+from slamreplay.ingest.pipeline import ingest
+from slamreplay.simulate.recording import Recording
+from slamreplay.simulate.topics import records
+from slamreplay.simulate.writer import write_log
+
+
+def bundle_of(recording: Recording, name: str = "simulated") -> Bundle:
+    """The log of a recording, read as any other log.
+
+    The log is really written and really ingested, in a folder that is gone afterwards: roles,
+    frames and clock are found as in any other log.
+
+    Args:
+        recording: what was simulated.
+        name: of the log's file, without its suffix; the manifest tells it as the source.
+    """
+    with TemporaryDirectory(prefix="slamreplay-") as folder:
+        log = Path(folder) / f"{name}.mcap"
+        write_log(log, lambda messages: records(recording, messages))
+        on_disk = ingest([log], Path(folder) / "bundle")
+        tables = {name: on_disk.table(name) for name in TABLES}
+        return Bundle(on_disk.manifest, tables, on_disk.grids())
