@@ -9,6 +9,8 @@ ESTIMATORS = Registry(
         "dead_reckoning": "slamreplay.estimators.dead_reckoning:DeadReckoning",
         "ekf": "slamreplay.estimators.ekf.estimator:Ekf",
         "ekf_tuned": "slamreplay.estimators.ekf.estimator:EkfTuned",
+        "pose_graph": "slamreplay.estimators.pose_graph.estimator:PoseGraph",
+        "pose_graph_online": "slamreplay.estimators.pose_graph.estimator:PoseGraphOnline",
         "recorded": "slamreplay.estimators.recorded:Recorded",
         "recorded_pose": "slamreplay.estimators.recorded:RecordedPose",
         "recorded_tf": "slamreplay.estimators.recorded:RecordedTf",

@@ -156,13 +156,13 @@ def align(tags, lines, oldest, points, normals, pose, prior, held, sigma, part, 
         out: (3, 3) written: information of the match were the variance of a point 1.
 
     Returns:
-        Mean score of the points, mean weighted square of their distances (m^2), and how many of
-        them count.
+        Mean score of the points, mean weighted square of their distances (m^2), and how far the
+        prior was trusted: Student's weight for 4 degrees of freedom, 1 where it fits.
     """
     count = points.shape[0]
     oxx = oxy = oxt = oyy = oyt = ott = 0.0
     score = squares = weights = 0.0
-    width = 4.0 * sigma
+    width, trust = 4.0 * sigma, 1.0
     px, py, pt = pose[0], pose[1], pose[2]
     for turn in range(MOST_STEPS):
         reach = 2 if turn < 4 else 1
@@ -246,4 +246,4 @@ def align(tags, lines, oldest, points, normals, pose, prior, held, sigma, part, 
     out[0, 0], out[0, 1], out[0, 2] = oxx, oxy, oxt
     out[1, 0], out[1, 1], out[1, 2] = oxy, oyy, oyt
     out[2, 0], out[2, 1], out[2, 2] = oxt, oyt, ott
-    return score / max(count, 1), squares / max(weights, 1e-9), weights
+    return score / max(count, 1), squares / max(weights, 1e-9), trust

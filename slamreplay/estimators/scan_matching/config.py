@@ -22,18 +22,24 @@ class MatchConfig:
         position_per_turn: m after turning by 1 rad.
         heading_per_metre: and of the heading, rad after 1 m.
         heading_per_turn: rad after turning by 1 rad.
-        poor: a match is doubted that scores less than this share of what matches do there.
+        drift_part: of a match's variance the map takes on so much as drift.
+        late_part: a scan's stamp is off by this share of the time between two scans.
+        doubted: a match that scores less than this share of what matches do is looked for again.
+        poor: one that scores less than this share is none.
         lost_scans: after so many scans that match nothing a new map is begun.
     """
 
     node_m: float = 0.2
     node_rad: float = 0.2
-    memory: int = 30
+    memory: int = 60
     sigma_m: float = 0.02
     points_per_fact: float = 4.0
     position_per_metre: float = 0.05
-    position_per_turn: float = 0.03
-    heading_per_metre: float = 0.03
-    heading_per_turn: float = 0.05
-    poor: float = 0.7
+    position_per_turn: float = 0.05
+    heading_per_metre: float = 0.2
+    heading_per_turn: float = 0.3
+    drift_part: float = 0.3
+    late_part: float = 0.05
+    doubted: float = 0.8
+    poor: float = 0.45
     lost_scans: int = 5

@@ -18,11 +18,15 @@ LEAST_POINTS = 10
 GAIN = 0.05
 #: Innovations beyond this (chi-square of 3) are looked into.
 DOUBTED_NIS = 40.0
+#: Beyond this odometry missed what the scan moved by.
+REFUTED_NIS = 16.0
 #: Where no odometry tells a step the speed of before is expected: it is known to this part, and to
 #: this at the least, m and rad.
 GUESS_PART, GUESS_M, GUESS_RAD = 0.5, 0.03, 0.03
 #: Where odometry has a gap, to these.
 BRIDGED_PART, BRIDGED_M, BRIDGED_RAD = 0.5, 0.02, 0.02
+#: What a scan's pose misses that nothing else shows, at the least, m and rad.
+JITTER_M, JITTER_RAD = 0.001, 0.0005
 #: How fast the typical score and spread follow.
 RATE = 0.02
 #: Bounds of a point's standard deviation about its line, m.
@@ -58,12 +62,15 @@ class Follower:
         config: hyper-parameters.
         pose: (3,) of the last scan.
         cov: (3, 3) of it against the last node.
-        carried: (3, 3) the same, had nothing been matched since.
+        drift: (3, 3) of what of its error the map takes on: much of a match's error is gone with the
+            next, for a node is laid onto many.
+        carried: (3, 3) of it, had nothing been matched since.
     """
 
     config: MatchConfig
     pose: se2.Array = field(default_factory=lambda: np.zeros(3))
     cov: se2.Array = field(default_factory=lambda: np.zeros((3, 3)))
+    drift: se2.Array = field(default_factory=lambda: np.zeros((3, 3)))
     carried: se2.Array = field(default_factory=lambda: np.zeros((3, 3)))
     motion: se2.Array = field(default_factory=lambda: np.zeros(3))
     learned: se2.Array = field(default_factory=lambda: np.array([1.0, 1.0, fusion.FIRST_SCANS]))
@@ -77,7 +84,8 @@ class Follower:
         self._per_way = np.array([
             c.position_per_metre, c.position_per_turn, c.heading_per_metre, c.heading_per_turn
         ])  # fmt: skip
-        self._prior, self._noise, self._told = np.empty(3), np.empty(2), np.empty(21)
+        self._prior, self._noise, self._told = np.empty(3), np.empty(4), np.empty(30)
+        self._jitter = np.empty((3, 3))
         self._expected, self._held = np.empty((3, 3)), np.empty((3, 3))
         self._room, self._sums = np.empty((3, 3, 3)), np.empty((3, 3))
         self._field: ScoreField | None = None
@@ -91,8 +99,8 @@ class Follower:
     def add_node(self, points: se2.Array, normals: se2.Array) -> se2.Array:
         """Put the last scan into the map; its covariance (3, 3) against the node before."""
         self.map.add(self.pose, points, normals)
-        cov = self.cov.copy()
-        self.cov[:] = 0.0
+        cov = self.drift.copy()
+        self.cov[:] = self.drift[:] = 0.0
         self.carried[:] = 0.0
         self._field = None
         return cov
@@ -116,6 +124,7 @@ class Follower:
             before, self.cov, step, self._per_way, self.learned, least,
             self._prior, self._noise, self._expected, self._held,
         )  # fmt: skip
+        fusion.late(self._prior, step, self.config.late_part, _JITTER, self._jitter)
         prior = self._prior.copy()
         fusion.carry_on(
             self.carried, prior[0] - before[0], prior[1] - before[1], self._noise, self._room
@@ -123,15 +132,19 @@ class Follower:
         score, nis, pose = 0.0, np.inf, prior.copy()
         if len(points) >= LEAST_POINTS:
             score, nis = self._laid(points, normals, pose)
-            poor = score < self.config.poor * self.typical
-            if poor or nis > DOUBTED_NIS:
+            if score < self.config.doubted * self.typical or nis > DOUBTED_NIS:
                 score, nis, pose = self._searched(points, normals, before, pose, score, nis)
-                poor = score < self.config.poor * self.typical
-        else:
-            poor = True
+        poor = len(points) < LEAST_POINTS or score < self.config.poor * self.typical
         if poor:
             return self._missed(prior, score, matched=len(points) >= LEAST_POINTS)
-        fusion.both(self.carried, self._told, self.cov, self._room)
+        told = self._told
+        off = pose - prior
+        off[2] = se2.wrap_angle(off[2])
+        if nis > REFUTED_NIS:  # wheels that slip, a robot that is carried
+            self.carried += np.outer(off, off)
+        fusion.both(self.carried, told[12:21].reshape(3, 3), self.cov, self._room)
+        held = told[21:].reshape(3, 3) / self.config.drift_part
+        fusion.both(self.carried, held, self.drift, self._room)
         self.typical += RATE * (score - self.typical)
         self.lost = 0
         self.pose = pose
@@ -140,14 +153,11 @@ class Follower:
         self.motion = np.array([
             c * moved[0] + s * moved[1], c * moved[1] - s * moved[0], se2.wrap_angle(moved[2])
         ])  # fmt: skip
-        told = self._told
-        off = pose - prior
-        off[2] = se2.wrap_angle(off[2])
         return Fit(pose, told[:3].copy(), told[3:12].reshape(3, 3).copy(), score, True, off)
 
     def _missed(self, prior: se2.Array, score: float, *, matched: bool) -> Fit:
         self.pose = prior
-        self.cov = self.carried.copy()
+        self.cov, self.drift = self.carried.copy(), self.carried.copy()
         self.motion = np.zeros(3)
         self.lost += matched
         told = self._told
@@ -169,15 +179,15 @@ class Follower:
     def _laid(self, points: se2.Array, normals: se2.Array, pose: se2.Array) -> tuple[float, float]:
         """Score and r' S^-1 r of the scan, its `pose` moved to where it lies best."""
         c = self.config
-        score, squares, _ = align(
+        score, squares, trust = align(
             self.map.tags, self.map.lines, self.map.now - c.memory, points, normals, pose,
             self._prior, self._held, c.sigma_m, c.points_per_fact, self._sums,
         )  # fmt: skip
         pose[2] = se2.wrap_angle(pose[2])
         variance = max(self.variance, FINEST_M**2) * c.points_per_fact
         nis = fusion.fuse(
-            self._prior, self._expected, self._held, self._noise, pose, self._sums, variance,
-            self.learned, self._told, self._room,
+            self._prior, self._expected, self._held, trust, self._noise, pose, self._sums,
+            variance, self._jitter, self.learned, self._told, self._room,
         )  # fmt: skip
         if score > c.poor * self.typical:
             self.variance += RATE * (squares - self.variance)
@@ -209,3 +219,4 @@ class Follower:
 
 
 _LEAST = np.array([fusion.LEAST_M, fusion.LEAST_RAD])
+_JITTER = np.array([JITTER_M, JITTER_RAD])

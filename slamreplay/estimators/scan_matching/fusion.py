@@ -16,7 +16,9 @@ ANYWHERE_M, ANYWHERE_RAD = 1.0, 1.0
 #: So many scans weigh as much as what is assumed of odometry at first, and at the most.
 FIRST_SCANS, MOST_SCANS = 20.0, 300.0
 #: The noise learned stays within these factors of what is assumed, as variances.
-LEAST_FACTOR, MOST_FACTOR = 2.5, 400.0
+LEAST_FACTOR, MOST_FACTOR = 0.05, 400.0
+#: Squares of what odometry missed count up to so many times what was expected.
+MOST_SQUARES = 25.0
 
 
 @njit(cache=True, nogil=True)
@@ -31,7 +33,8 @@ def predict(pose, cov, step, per_way, learned, least, prior, noise, expected, he
         learned: (3,) factors of the variances of position and heading, scans they come from.
         least: (2,) m and rad, what any step misses.
         prior: (3,) written.
-        noise: (2,) variances of the step in position and heading, written.
+        noise: (4,) variances of the step in position and heading, written: as a prior has them,
+            never less than assumed, for what odometry misses is not white; and as learned.
         expected: (3, 3) covariance of the prior, written.
         held: (3, 3) its inverse, written.
     """
@@ -40,13 +43,33 @@ def predict(pose, cov, step, per_way, learned, least, prior, noise, expected, he
     prior[0], prior[1] = pose[0] + dx, pose[1] + dy
     prior[2] = (pose[2] + step[2] + np.pi) % (2.0 * np.pi) - np.pi
     way, turn = np.hypot(dx, dy), abs(step[2])
-    noise[0] = learned[0] * (per_way[0] ** 2 * way + per_way[1] ** 2 * turn) + least[0] ** 2
-    noise[1] = learned[1] * (per_way[2] ** 2 * way + per_way[3] ** 2 * turn) + least[1] ** 2
+    assumed = per_way[0] ** 2 * way + per_way[1] ** 2 * turn
+    assumed_yaw = per_way[2] ** 2 * way + per_way[3] ** 2 * turn
+    noise[0] = max(learned[0], 1.0) * assumed + least[0] ** 2
+    noise[1] = max(learned[1], 1.0) * assumed_yaw + least[1] ** 2
+    noise[2] = learned[0] * assumed + least[0] ** 2
+    noise[3] = learned[1] * assumed_yaw + least[1] ** 2
     _swung(cov, dx, dy, expected)
     expected[0, 0] += noise[0]
     expected[1, 1] += noise[0]
     expected[2, 2] += noise[1]
     inverse(expected, held)
+
+
+@njit(cache=True, nogil=True)
+def late(prior, step, part, least, out):  # type: ignore[no-untyped-def]
+    """Covariance (3, 3) of a pose whose stamp is off by a part of a step, and by `least` at least.
+
+    It is off along the motion alone.
+    """
+    cos, sin = np.cos(prior[2]), np.sin(prior[2])
+    along = (cos * step[0] - sin * step[1], sin * step[0] + cos * step[1], step[2])
+    for i in range(3):
+        for j in range(3):
+            out[i, j] = part * part * along[i] * along[j]
+    out[0, 0] += least[0] ** 2
+    out[1, 1] += least[0] ** 2
+    out[2, 2] += least[1] ** 2
 
 
 @njit(cache=True, nogil=True)
@@ -63,23 +86,26 @@ def _swung(cov, dx, dy, out):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def fuse(prior, expected, held, noise, pose, per_point, variance, learned, told, room):  # type: ignore[no-untyped-def]
+def fuse(prior, expected, held, trust, noise, pose, per_point, variance, jitter, learned, told, room):  # type: ignore[no-untyped-def]
     """What the match said, from where prior and match met.
 
-    The top of both, `pose`, has H (match - pose) = held (pose - prior): so the match alone would
-    have been at pose + H^-1 held (pose - prior).
+    The top of both, `pose`, has H (match - pose) = trust held (pose - prior): so the match alone
+    would have been at pose + H^-1 trust held (pose - prior).
 
     Args:
         prior: (3,).
         expected: (3, 3) covariance of the prior.
         held: (3, 3) its inverse.
-        noise: (2,) variances of the step before.
+        trust: how much of `held` was used, 0 to 1.
+        noise: (4,) variances of the step, as in `predict`.
         pose: (3,) of both.
         per_point: (3, 3) sum of the points' information at a variance of 1.
         variance: of a point that counts for one.
+        jitter: (3, 3) covariance of the pose by what no point shows, a late stamp.
         learned: (3,) as in `predict`; updated by expectation and maximization: the expected square
-            of what odometry missed given the innovation (Shumway and Stoffer 1982, one step).
-        told: (3 + 9 + 9,) written: innovation, its covariance S, information of the match.
+            of what odometry missed given the innovation (Shumway and Stoffer 1982), axis by axis.
+        told: (3 + 9 + 9 + 9,) written: innovation, its covariance S, information of the match, and
+            that without jitter.
         room: (3, 3, 3) scratch.
 
     Returns:
@@ -89,7 +115,6 @@ def fuse(prior, expected, held, noise, pose, per_point, variance, learned, told,
     for i in range(3):
         for j in range(3):
             H[i, j] = per_point[i, j] / variance
-            told[12 + 3 * i + j] = H[i, j]
     H[0, 0] += 1.0 / ANYWHERE_M**2
     H[1, 1] += 1.0 / ANYWHERE_M**2
     H[2, 2] += 1.0 / ANYWHERE_RAD**2
@@ -99,9 +124,18 @@ def fuse(prior, expected, held, noise, pose, per_point, variance, learned, told,
     gx = held[0, 0] * ex + held[0, 1] * ey + held[0, 2] * et
     gy = held[1, 0] * ex + held[1, 1] * ey + held[1, 2] * et
     gt = held[2, 0] * ex + held[2, 1] * ey + held[2, 2] * et
+    gx, gy, gt = trust * gx, trust * gy, trust * gt
     told[0] = ex + R[0, 0] * gx + R[0, 1] * gy + R[0, 2] * gt
     told[1] = ey + R[1, 0] * gx + R[1, 1] * gy + R[1, 2] * gt
     told[2] = et + R[2, 0] * gx + R[2, 1] * gy + R[2, 2] * gt
+    for i in range(3):
+        for j in range(3):
+            told[21 + 3 * i + j] = H[i, j]
+            R[i, j] += jitter[i, j]
+    inverse(R, H)
+    for i in range(3):
+        for j in range(3):
+            told[12 + 3 * i + j] = H[i, j]
     for i in range(3):
         for j in range(3):
             S[i, j] = expected[i, j] + R[i, j]
@@ -111,32 +145,36 @@ def fuse(prior, expected, held, noise, pose, per_point, variance, learned, told,
     for i in range(3):
         for j in range(3):
             nis += told[i] * H[i, j] * told[j]
-    calm = min(1.0, 16.0 / max(nis, 1e-9))
-    missed = spread = 0.0
-    for i in range(2):
-        w = noise[0] * (H[i, 0] * told[0] + H[i, 1] * told[1] + H[i, 2] * told[2])
-        missed += calm * w * w + noise[0] - noise[0] * noise[0] * H[i, i]
-        spread += noise[0]
-    w = noise[1] * (H[2, 0] * told[0] + H[2, 1] * told[1] + H[2, 2] * told[2])
-    missed_t = calm * w * w + noise[1] - noise[1] * noise[1] * H[2, 2]
-    if noise[0] > 4.0 * LEAST_M**2:
+    if noise[2] > 4.0 * LEAST_M**2:
         learned[2] = min(learned[2] + 1.0, MOST_SCANS)
-        rate = 1.0 / learned[2]
-        learned[0] *= 1.0 + rate * (missed / spread - 1.0)
-        learned[1] *= 1.0 + rate * (missed_t / noise[1] - 1.0)
+        missed = 0.5 * (
+            _missed(told[0], noise[2], expected[0, 0] - noise[0] + R[0, 0])
+            + _missed(told[1], noise[2], expected[1, 1] - noise[0] + R[1, 1])
+        )
+        missed_yaw = _missed(told[2], noise[3], expected[2, 2] - noise[1] + R[2, 2])
+        learned[0] *= 1.0 + (missed - 1.0) / learned[2]
+        learned[1] *= 1.0 + (missed_yaw - 1.0) / learned[2]
         for i in range(2):
             learned[i] = min(max(learned[i], LEAST_FACTOR), MOST_FACTOR)
     return nis
 
 
 @njit(cache=True, nogil=True)
-def both(carried, told, out, room):  # type: ignore[no-untyped-def]
+def _missed(innovation, noise, rest):  # type: ignore[no-untyped-def]
+    """Expected square of what odometry missed over its variance, given an innovation."""
+    gain = noise / (noise + rest)
+    square = min(innovation * innovation / (noise + rest), MOST_SQUARES)
+    return gain * square + 1.0 - gain
+
+
+@njit(cache=True, nogil=True)
+def both(carried, information, out, room):  # type: ignore[no-untyped-def]
     """(3, 3) covariance from what odometry carried since the node and the match's information."""
     A = room[0]
     inverse(carried, A)
     for i in range(3):
         for j in range(3):
-            A[i, j] += told[12 + 3 * i + j]
+            A[i, j] += information[i, j]
     inverse(A, out)
 
 
@@ -148,9 +186,9 @@ def carry_on(carried, dx, dy, noise, room):  # type: ignore[no-untyped-def]
     for i in range(3):
         for j in range(3):
             carried[i, j] = out[i, j]
-    carried[0, 0] += noise[0]
-    carried[1, 1] += noise[0]
-    carried[2, 2] += noise[1]
+    carried[0, 0] += noise[2]
+    carried[1, 1] += noise[2]
+    carried[2, 2] += noise[3]
 
 
 @njit(cache=True, nogil=True)

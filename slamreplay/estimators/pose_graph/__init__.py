@@ -1,0 +1,1 @@
+"""SLAM by a pose graph: submaps, loop closures by branch and bound, GTSAM."""

@@ -1,0 +1,235 @@
+"""Loop closing while the way is driven: each finished submap is looked for among those before.
+
+What is done at a submap depends on nothing after it, so that the same pass serves the online mode,
+and tells how far each closure moved the belief when it was found.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from slamreplay.estimators.pose_graph.config import GraphConfig
+from slamreplay.estimators.pose_graph.placing import Searcher, information_of
+from slamreplay.estimators.pose_graph.submaps import Submaps
+from slamreplay.geometry import se2
+from slamreplay.geometry.covariance import composed, turned
+from slamreplay.graph.online import OnlineGraph
+from slamreplay.graph.relations import Relations
+
+#: A place is searched this many standard deviations about where it is expected, and a bit more.
+SIGMAS, MARGIN_M, MARGIN_RAD = 3.0, 0.1, np.radians(2.0)
+#: A heading that is known no better than to this may be any, rad.
+ANY_HEADING = np.pi / 4.0
+#: Closures that confirm each other come from submaps at most so many apart.
+TOGETHER = 6
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """A place that was found for a submap, taken or not.
+
+    Attributes:
+        old: submap that it was laid on.
+        new: submap that was laid.
+        xyyaw: (3,) the new one's reference seen from the old one's.
+        cov: (3, 3) of it, about axes of the old one.
+        score: 0 to 1.
+        residual: (3,) measured minus predicted.
+        S: (3, 3) covariance predicted for it: of the prediction and of the match.
+        nis: r' S^-1 r.
+        accepted: whether the graph took it in.
+        moved: (3,) by how much the new submap moved when it was taken in; NaN where it waited for
+            others, with which it was taken in later.
+    """
+
+    old: int
+    new: int
+    xyyaw: se2.Array
+    cov: se2.Array
+    score: float
+    residual: se2.Array
+    S: se2.Array
+    nis: float
+    accepted: bool = False
+    moved: se2.Array = field(default_factory=lambda: np.zeros(3))
+
+
+@dataclass(frozen=True, eq=False)
+class Closed:
+    """What a pass over the submaps found.
+
+    Attributes:
+        candidates: in the order in which they were found.
+        belief: (C, 3) where each submap's reference was believed to be once it was done.
+        belief_cov: (C, 3, 3) of it, about the parent's axes; empty where not asked for.
+        poses: (C, 3) where all are at the end.
+    """
+
+    candidates: tuple[Candidate, ...]
+    belief: se2.Array
+    belief_cov: se2.Array
+    poses: se2.Array
+
+    def relations(self) -> Relations:
+        """The accepted ones, between submaps."""
+        return relations_of([c for c in self.candidates if c.accepted])
+
+
+def relations_of(candidates: list[Candidate]) -> Relations:
+    """Candidates as relations between submaps."""
+    if not candidates:
+        return Relations.none()
+    return Relations(
+        np.array([[c.old, c.new] for c in candidates]),
+        np.array([c.xyyaw for c in candidates]),
+        np.array([c.cov for c in candidates]),
+    )
+
+
+def close_loops(
+    maps: Submaps,
+    first: se2.Array,
+    first_cov: se2.Array,
+    config: GraphConfig,
+    match_scale: float = 1.0,
+    with_cov: bool = False,
+) -> Closed:
+    """Look for every submap among those before it, in the order in which they were driven.
+
+    Args:
+        maps: the submaps.
+        first: (3,) pose of the first one's reference.
+        first_cov: (3, 3) of it.
+        config: hyper-parameters.
+        match_scale: ratio by which covariances of matches are changed.
+        with_cov: whether the covariance of each belief is worked out.
+    """
+    closer = _Closer(maps, OnlineGraph(first, first_cov), config, match_scale)
+    belief, cov = [first], [first_cov]
+    for new in range(1, len(maps)):
+        closer.take(new)
+        belief.append(closer.poses[new])
+        if with_cov:
+            cov.append(closer.graph.marginal(new))
+    return Closed(
+        tuple(closer.candidates[k] for k in sorted(closer.candidates)),
+        np.array(belief),
+        np.array(cov) if with_cov else np.empty((0, 3, 3)),
+        closer.poses,
+    )
+
+
+class _Closer:
+    """The graph of submaps as it grows, and the closures that wait for others to confirm them."""
+
+    def __init__(
+        self, maps: Submaps, graph: OnlineGraph, config: GraphConfig, match_scale: float
+    ) -> None:
+        self.maps, self.graph, self.config, self.match_scale = maps, graph, config, match_scale
+        self.poses = graph.poses
+        self.candidates: dict[int, Candidate] = {}  # by the new submap
+        self._waiting: list[int] = []
+        self._searcher = Searcher()
+        self._last = maps.way[maps.stops[1:] - 1]  # way to the last node of each
+
+    def take(self, new: int) -> None:
+        """Add a submap to the graph, and look for it."""
+        maps, config = self.maps, self.config
+        self.graph.extend(maps.motion[new - 1], maps.motion_cov[new - 1])
+        self.poses = np.vstack([self.poses, se2.compose(self.poses[-1], maps.motion[new - 1])])
+        begin = maps.way[maps.stops[new]]
+        old = np.flatnonzero(begin - self._last[:new] > config.apart_m)
+        if not len(old):
+            return
+        away = self._away(old, self.poses[new])
+        near = int(old[np.argmin(away)])
+        S = self.graph.relative(self.poses, near, new)
+        sigma = float(np.sqrt(np.linalg.eigvalsh(S[:2, :2])[-1]))
+        reach_m, reach_rad = SIGMAS * sigma + MARGIN_M, SIGMAS * np.sqrt(S[2, 2]) + MARGIN_RAD
+        reach_rad = np.pi if reach_rad > ANY_HEADING else float(reach_rad)
+        reach_m = np.inf if reach_m > config.window_m else reach_m
+        known = old[away < config.reach_m + reach_m]
+        if not len(known):
+            return
+        found = self._placed(new, near, known, reach_m, reach_rad)
+        if found is None:
+            return
+        self.candidates[new] = found
+        if found.score < config.min_score or found.nis > config.gate:
+            return
+        self._judge(found, is_sure=sigma < config.sure_m)
+
+    def _away(self, old: NDArray[np.int64], pose: se2.Array) -> se2.Array:
+        step = self.poses[old, :2] - pose[:2]
+        return np.asarray(np.hypot(step[:, 0], step[:, 1]))
+
+    def _placed(
+        self, new: int, near: int, known: NDArray[np.int64], reach_m: float, reach_rad: float
+    ) -> Candidate | None:
+        """Search for a submap on the known ones, in axes of the near one; lay it on the nearest."""
+        poses, maps = self.poses, self.maps
+        seen = np.concatenate([
+            se2.transform_points(pose, maps.clouds[k])
+            for k, pose in zip(known, se2.between(poses[near], poses[known]), strict=True)
+        ])  # fmt: skip
+        expected = se2.between(poses[near], poses[new])
+        place = self._searcher.best(seen, maps.clouds[new], expected, reach_m, reach_rad)
+        if place is None:
+            return None
+        there = se2.compose(poses[near], place.xyyaw)
+        on = int(known[np.argmin(self._away(known, there))])
+        cov = np.linalg.inv(information_of(place.information, self.config))
+        cov = turned(cov, poses[near, 2] - poses[on, 2]) * self.match_scale
+        left = self.config.closure_m, self.config.closure_m, self.config.closure_rad
+        cov = cov + np.diag(np.square(left)) * self.match_scale
+        z = se2.between(poses[on], there)
+        residual = z - se2.between(poses[on], poses[new])
+        residual[2] = se2.wrap_angle(residual[2])
+        S = self.graph.relative(poses, on, new) + cov
+        nis = float(residual @ np.linalg.solve(S, residual))
+        return Candidate(on, new, z, cov, place.score, residual, S, nis)
+
+    def _judge(self, found: Candidate, *, is_sure: bool) -> None:
+        agreeing: list[int] = []
+        if not is_sure:
+            self._waiting = [k for k in self._waiting if found.new - k <= TOGETHER]
+            agreeing = [k for k in self._waiting if self._agree(self.candidates[k], found)]
+            if len(agreeing) < self.config.confirmations:
+                self._waiting.append(found.new)
+                return
+        taken = [*agreeing, found.new]
+        self._waiting = [k for k in self._waiting if k not in agreeing]
+        relations = relations_of([self.candidates[k] for k in taken])
+        before = self.poses[found.new]
+        numbers = self.graph.close(relations)
+        self.poses = self.graph.poses
+        if (relations.chi2(self.poses) > self.config.gate).any():
+            self.graph.undo(numbers)  # what the others say of the same places speaks against it
+            self.poses = self.graph.poses
+            return
+        moved = self.poses[found.new] - before
+        moved[2] = se2.wrap_angle(moved[2])
+        for k in taken:
+            own = moved if k == found.new else np.full(3, np.nan)
+            self.candidates[k] = replace(self.candidates[k], accepted=True, moved=own)
+
+    def _agree(self, one: Candidate, two: Candidate) -> bool:
+        """Whether two closures say the same of the motion between their submaps.
+
+        They are held against each other around the loop of both (pairwise consistency: Mangelson,
+        Dominic, Eustice, Vasudevan, ICRA 2018, eq. 4).
+        """
+        maps, poses = self.maps, self.poses
+        motion = maps.between(one.new, two.new)
+        cov = composed(one.xyyaw, one.cov, motion, maps.covariance(one.new, two.new))
+        old = se2.between(poses[two.old], poses[one.old])
+        z = se2.compose(old, se2.compose(one.xyyaw, motion))
+        off = two.xyyaw - z
+        off[2] = se2.wrap_angle(off[2])
+        S = two.cov + turned(cov, old[2])
+        if one.old != two.old:
+            S = S + self.graph.relative(poses, two.old, one.old)
+        return bool(off @ np.linalg.solve(S, off) < self.config.gate)
