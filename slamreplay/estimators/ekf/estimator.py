@@ -150,6 +150,7 @@ class EkfTuned:
     causal: ClassVar[bool] = False
     needs: ClassVar[frozenset[str]] = frozenset({"odometry", "sightings"})
     settings: ClassVar[frozenset[str]] = SETTINGS
+    without_noise: ClassVar[str] = "it fits its noise to the log, and a few seconds cannot tell it"
 
     def run(self, view: BundleView, *, seed: int) -> Estimate:  # noqa: ARG002 - nothing is random
         """As of the filter; scalars hold what was fitted, too, `fitted.range_per_m` for one.
