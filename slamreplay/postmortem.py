@@ -7,16 +7,18 @@ from collections.abc import Callable, Collection, Sequence
 from slamreplay.bundle.belief import belief_times, recorded_belief
 from slamreplay.bundle.findings import SEVERITIES, Finding
 from slamreplay.bundle.odometry import odometry_track
-from slamreplay.bundle.run import Run
-from slamreplay.bundle.view import Bundle
+from slamreplay.bundle.run import Run, Trial
+from slamreplay.bundle.view import Bundle, BundleView
 from slamreplay.consistency.answers import raised
 from slamreplay.consistency.asking import answered
 from slamreplay.consistency.belief.credibility import nees_of_belief
+from slamreplay.consistency.belief.jumps.found import jumps_of
 from slamreplay.consistency.belief.summary import consistency_summaries
 from slamreplay.consistency.context import CheckContext
 from slamreplay.consistency.evidence.references import references_of, unused_references
 from slamreplay.consistency.evidence.sensed import sensed_references
-from slamreplay.estimators import RECORDED
+from slamreplay.estimators import ESTIMATORS, RECORDED
+from slamreplay.estimators.recorded import recorded_names
 from slamreplay.hindsight.pipeline import hindsight
 from slamreplay.replay.metrics import trial_metrics
 from slamreplay.report.evidence import Postmortem, TrialResult
@@ -37,6 +39,7 @@ def postmortem(
     limits: Limits | None = None,
     hold_out: Collection[str] = (),
     correct_map: bool = False,
+    trace_ns: int | None = None,
     progress: Callable[[str, float], None] | None = None,
 ) -> Postmortem:
     """Look back on one log.
@@ -51,6 +54,7 @@ def postmortem(
         hold_out: kinds of sensed references (fiducial, dock, gnss) that judge hindsight instead of
             joining it.
         correct_map: propose a corrected map, too.
+        trace_ns: a moment around which to tell which measurements moved the belief.
         progress: told what is being done, and the share done from 0 to 1.
     """
     limits = Limits() if limits is None else limits
@@ -91,6 +95,9 @@ def postmortem(
         )
         for run, asked in zip(runs, of_runs, strict=True)
     )
+    recorded = () if any(run.trial.estimator in RECORDED for run in runs) else _recorded(view)
+    everybody = [(run, CheckContext.of_run(run, references, view)) for run in recorded]
+    everybody += zip(runs, of_runs, strict=True)
     say("done", 1.0)
     return Postmortem(
         manifest=bundle.manifest,
@@ -107,7 +114,17 @@ def postmortem(
         nees=nees_of_belief(context),
         consistency=consistency_summaries(context, answers),
         trials=trials,
+        recorded=recorded,
+        jumps=tuple((asked_run.trial, jumps_of(asked)) for asked_run, asked in everybody),
+        trace_ns=trace_ns,
     )
+
+
+def _recorded(view: BundleView) -> tuple[Run, ...]:
+    """The localizer of the log as runs: they are asked nothing, and keep its ledger."""
+    names = recorded_names(view)
+    runs = (Trial(view.manifest.bundle_id, name, 0) for name in names)
+    return tuple(Run(trial, ESTIMATORS.load(trial.estimator)().run(view, seed=0)) for trial in runs)
 
 
 def _worst_first(findings: Sequence[Finding]) -> tuple[Finding, ...]:

@@ -7,7 +7,7 @@ from rosbags.typesys import Stores, get_typestore
 from slamreplay.estimators import ESTIMATORS
 from slamreplay.ingest import DECODERS
 from slamreplay.perturb import PERTURBATIONS
-from slamreplay.testing import check_decoder, check_estimator, check_perturbation
+from slamreplay.testing import check_decoder, check_estimator, check_noise, check_perturbation
 from slamreplay.testing.decoders import check_payload
 
 #: Name, and by how much sampling noise lets its poses miss a moved map frame: m, rad.
@@ -667,6 +667,11 @@ DECODER_LINES = {
 def test_estimator(name):
     tolerance_m, tolerance_rad = ESTIMATOR_LINES[name]
     check_estimator(ESTIMATORS.load(name)(), tolerance_m=tolerance_m, tolerance_rad=tolerance_rad)
+
+
+@pytest.mark.parametrize("name", list(ESTIMATORS))
+def test_estimators_covariance_follows_its_noise(name):
+    check_noise(ESTIMATORS.load(name)())
 
 
 @pytest.mark.parametrize("name", PERTURBATION_LINES)

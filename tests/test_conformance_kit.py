@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from slamreplay.bundle.odometry import odometry_track
-from slamreplay.bundle.run import Estimate
+from slamreplay.bundle.run import Estimate, Innovations
 from slamreplay.bundle.track import PoseTrack
 from slamreplay.bundle.view import BundleView
 from slamreplay.errors import UsageError
@@ -19,6 +19,7 @@ from slamreplay.perturb.variant import Variant, check_level
 from slamreplay.testing.conformance import ConformanceError
 from slamreplay.testing.decoders import check_decoder
 from slamreplay.testing.estimators import check_estimator
+from slamreplay.testing.matched import SCALES, check_noise
 from slamreplay.testing.perturbations import check_perturbation
 
 
@@ -116,8 +117,62 @@ def half_a_pose(estimate, view, seed):
     return with_track(estimate, xyyaw)
 
 
+def covariance_stays_where_the_map_was(estimate, view, seed):
+    sigma = np.sqrt(np.trace(estimate.track.cov, axis1=1, axis2=2))
+    return with_track(estimate, cov=sigma[:, None, None] ** 2 * np.diag([1.0, 0.01, 0.1]))
+
+
+def ledger(estimate, view, seed, **fields):
+    """One row per scan that has a pose, each moving the belief a little."""
+    t = estimate.track.t_ns[estimate.track.has_pose]
+    n = len(t)
+    whole = {
+        "source": "tags",
+        "t_ns": t,
+        "residual": np.zeros((n, 2)),
+        "S": np.tile(np.eye(2), (n, 1, 1)),
+        "accepted": np.ones(n, dtype=bool),
+        "axes": ("x m", "y m"),
+        "frame_id": "base_link",
+        "moved": np.full((n, 3), 1e-3),
+        "score": np.full(n, 0.5),
+    }
+    return replace(estimate, innovations=(Innovations(**{**whole, **fields}),))
+
+
+def with_ledger(**change):
+    """Dead reckoning with a ledger in which each named column is changed by a function."""
+
+    def spoil(estimate, view, seed):
+        (plain,) = ledger(estimate, view, seed).innovations
+        fields = {name: made(getattr(plain, name)) for name, made in change.items()}
+        return ledger(estimate, view, seed, **fields)
+
+    return spoil
+
+
+def ledger_knows_the_end(estimate, view, seed):
+    end = odometry_track(view).xyyaw[-1, 0]
+    return with_ledger(score=lambda score: np.full_like(score, abs(end) % 1.0))(
+        estimate, view, seed
+    )
+
+
+def two_of_a_name(estimate, view, seed):
+    (one,) = ledger(estimate, view, seed).innovations
+    return replace(estimate, innovations=(one, one))
+
+
+def unsure(column):
+    column = column.copy()
+    column[3] = np.nan
+    return column
+
+
 def test_the_kit_passes_what_is_sound():
     check_estimator(Broken(sound))
+    check_estimator(Broken(ledger))
+    check_estimator(Broken(with_ledger(S=lambda S: S * np.nan, is_predicted=lambda _: False)))
 
 
 @pytest.mark.parametrize(
@@ -136,11 +191,74 @@ def test_the_kit_passes_what_is_sound():
         (writes, "writes into"),
         (crashes_on_scanless_logs, "undeclared"),
         (half_a_pose, "partly NaN"),
+        (covariance_stays_where_the_map_was, "does not turn with it"),
+        (ledger_knows_the_end, "ledger of the past"),
+        (two_of_a_name, "two sets of one source"),
+        (with_ledger(source=lambda _: ""), "without a source"),
+        (with_ledger(residual=lambda r: r[:, :1]), "S is of shape"),
+        (with_ledger(S=lambda S: S[:, 0]), "S is of shape"),
+        (with_ledger(accepted=lambda a: a[1:]), "accepted is of shape"),
+        (with_ledger(moved=lambda m: m[:, :2]), "moved is of shape"),
+        (with_ledger(about=lambda a: a[1:]), "about is of shape"),
+        (with_ledger(axes=lambda _: ("x m",)), "1 axes are named, 2"),
+        (with_ledger(t_ns=lambda t: t + 60 * 10**9), "outside of the log"),
+        (with_ledger(S=lambda S: -S), "no covariance"),
+        (with_ledger(S=unsure), "no covariance"),
+        (with_ledger(residual=unsure), "residual not finite"),
+        (with_ledger(score=lambda s: s + 2.0), "score is not from 0 to 1"),
+        (with_ledger(moved=unsure), "does not say how far it moved"),
     ],
 )
 def test_a_broken_estimator_is_caught(spoil, caught):
     with pytest.raises(ConformanceError, match=caught):
         check_estimator(Broken(spoil))
+
+
+@dataclass(frozen=True)
+class Told:
+    """Dead reckoning that hears what it is told through a function of the scale."""
+
+    hears: Callable[[float], float]
+    claims: float = 1.0
+    needs: ClassVar[frozenset[str]] = frozenset({"odometry"})
+    settings: ClassVar[frozenset[str]] = frozenset()
+    name: ClassVar[str] = "told"
+
+    def told(self, scale: float) -> Any:
+        return DeadReckoning().told(self.hears(scale) * self.claims)
+
+
+@dataclass(frozen=True)
+class Deaf:
+    """One that takes the settings and does not honour them."""
+
+    needs: ClassVar[frozenset[str]] = frozenset({"odometry"})
+    settings: ClassVar[frozenset[str]] = SCALES
+    name: ClassVar[str] = "deaf"
+
+    def run(self, view: BundleView, *, seed: int) -> Estimate:
+        return DeadReckoning().run(view, seed=seed)
+
+
+def test_a_covariance_must_follow_the_noise():
+    check_noise(DeadReckoning())
+    check_noise(Told(lambda scale: scale))
+    for estimator, caught in (
+        (Told(lambda scale: 1.0), "does not follow what it is told"),
+        (Deaf(), "does not follow what it is told"),
+        (Told(lambda scale: scale, claims=0.6), "noise is that of the world"),
+        (Told(lambda scale: scale, claims=2.0), "noise is that of the world"),
+        (Broken(sound), "without_noise"),
+    ):
+        with pytest.raises(ConformanceError, match=caught):
+            check_noise(estimator)
+
+
+def test_one_without_a_model_of_noise_says_so_and_is_left_alone():
+    class Frank(Broken):
+        without_noise = "it was recorded"
+
+    check_noise(Frank(sound))
 
 
 def test_settings_and_needs_must_be_true():

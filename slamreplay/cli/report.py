@@ -57,6 +57,15 @@ UpdateMap = Annotated[
     ),
 ]
 
+Trace = Annotated[
+    float | None,
+    typer.Option(
+        "--trace",
+        metavar="S",
+        help="Tell which measurements moved the belief around this moment, in s from the start.",
+    ),
+]
+
 HoldOut = Annotated[
     list[str] | None,
     typer.Option(
@@ -84,6 +93,7 @@ def _report(
     start_s: Start = None,
     end_s: End = None,
     update_map: UpdateMap = None,
+    trace: Trace = None,
     hold_out: HoldOut = None,
     fail_on: FailOn = None,
     as_json: Json = False,
@@ -111,7 +121,12 @@ def _report(
         from slamreplay.cli.progress import progress_bar
         from slamreplay.postmortem import postmortem
         from slamreplay.report.build import build
+        from slamreplay.report.trace import trace_time
         from slamreplay.report.writer import write_report
+
+        manifest = bundle.manifest
+        span = manifest.start_ns, manifest.end_ns
+        trace_ns = None if trace is None else trace_time(trace, *span)
 
         with progress_bar("looking back") as progress:
             post = postmortem(
@@ -119,6 +134,7 @@ def _report(
                 runs,
                 hold_out=hold_out or (),
                 correct_map=update_map is not None,
+                trace_ns=trace_ns,
                 progress=progress,
             )
             page = write_report(post, output)
@@ -166,6 +182,7 @@ def _summarise(post: Postmortem, page: Path) -> None:
     from rich.text import Text
 
     from slamreplay.report.phrases import percent
+    from slamreplay.report.trace_text import trace_lines
     from slamreplay.report.words import FAILURE_MODES, STATES
 
     judgement = post.judgement
@@ -183,6 +200,8 @@ def _summarise(post: Postmortem, page: Path) -> None:
         console.print(Text(f"missing: {', '.join(missing)}", style="dim"))
     counts = {s: sum(f.severity == s for f in post.findings) for s in reversed(SEVERITIES)}
     console.print(Text(f"findings: {', '.join(f'{n} {s}' for s, n in counts.items())}"))
+    for line in trace_lines(post):
+        console.print(Text(line))
     console.print(Text(str(page)))
 
 

@@ -38,6 +38,14 @@ class DeadReckoning:
     needs: ClassVar[frozenset[str]] = frozenset({"odometry"})
     settings: ClassVar[frozenset[str]] = frozenset({OFFSET, ROTATE})
 
+    def told(self, scale: float) -> DeadReckoning:
+        """The same one, told standard deviations of `scale` times these."""
+        return DeadReckoning(
+            scale * self.position_per_metre,
+            scale * self.heading_per_metre,
+            scale * self.heading_per_turn,
+        )
+
     def run(self, view: BundleView, *, seed: int) -> Estimate:  # noqa: ARG002 - nothing is random
         """One row per scan (per odometry sample without scans), NaN where odometry says nothing.
 

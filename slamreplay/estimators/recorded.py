@@ -35,6 +35,7 @@ class Recorded:
     needs: ClassVar[frozenset[str]] = frozenset({"localizer"})
     settings: ClassVar[frozenset[str]] = frozenset()
     reruns: ClassVar[bool] = False
+    without_noise: ClassVar[str] = "it was recorded: nothing can be told to it any more"
     by: ClassVar[By | None] = None
 
     def run(self, view: BundleView, *, seed: int) -> Estimate:  # noqa: ARG002 - nothing is random

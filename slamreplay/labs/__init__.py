@@ -11,6 +11,7 @@ LABS = Registry(
     {
         "covariance_breathing": "slamreplay.labs.covariance_breathing.lab:CovarianceBreathing",
         "interval_calibration": "slamreplay.labs.interval_calibration.lab:IntervalCalibration",
+        "joint_estimation": "slamreplay.labs.joint_estimation.lab:JointEstimation",
         "two_run": "slamreplay.labs.two_run.lab:TwoRun",
     },
 )

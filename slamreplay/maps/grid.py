@@ -57,6 +57,14 @@ class OccupancyGrid:
         """(H, W) cells that a beam ends on."""
         return self.cells >= OCCUPIED_FROM
 
+    @cached_property
+    def barred(self) -> NDArray[np.bool_]:
+        """(H + 2, W + 2) occupied cells, in a frame of others that end a ray's way, too."""
+        barred = np.ones((self.cells.shape[0] + 2, self.cells.shape[1] + 2), dtype=bool)
+        barred[1:-1, 1:-1] = self.occupied
+        barred.setflags(write=False)
+        return barred
+
     @property
     def free(self) -> NDArray[np.bool_]:
         """(H, W) cells known to be empty."""

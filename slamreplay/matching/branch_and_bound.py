@@ -272,10 +272,12 @@ def _add_tables(bounds, search, first, stop, total, tops):  # type: ignore[no-un
     for run in range(first, stop):
         at = _locate(search, level, run)
         if length == 0:
-            for i in range(rows):
-                for j in range(cols):
+            for i in range(0, rows, 2):
+                for j in range(0, cols, 2):
                     _four_bounds(bounds, search, level, at, i, j, four)
-                    tops[run, i, j] = four[0]
+                    for k in range(4):
+                        if i + k // 2 < rows and j + k % 2 < cols:
+                            tops[run, i + k // 2, j + k % 2] = four[k]
             continue
         for block in range(0, count, 256):
             for q in range(length):

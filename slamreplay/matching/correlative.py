@@ -97,11 +97,12 @@ def match_each(
         centres: (N, 3) where to look.
         window: of all or of each; None climbs only.
     """
-    poses = np.array(centres, dtype=np.float64).reshape(-1, 3)
+    # Arrays of one layout, writeable: the kernel is compiled once for each kind it is handed.
+    poses = np.array(centres, dtype=np.float64, order="C").reshape(-1, 3)
     count = len(poses)
     stops = np.cumsum([0, *map(len, clouds)], dtype=np.int64)
     bounds = np.column_stack([stops[:-1], stops[1:]])
-    bounds = np.ascontiguousarray(np.broadcast_to(bounds, (count, 2)))
+    bounds = np.broadcast_to(bounds, (count, 2)).copy()
     points = np.concatenate([np.empty((0, 2)), *clouds])
     if isinstance(window, Sequence):
         shapes = np.array([_shape(w) for w in window]).reshape(count, 5)

@@ -94,7 +94,7 @@ def run_trial(bundle: Bundle, trial: Trial) -> Run:
 def _refuse_recorded(trial: Trial, estimator: Any) -> None:
     """What was recorded stays as it was, whatever is done to the evidence."""
     if trial.perturbation is not None and not getattr(estimator, "reruns", True):
-        raise NotApplicableError("recorded, cannot be run again", where=estimator.name)
+        raise NotApplicableError("recorded, cannot be run again")
 
 
 def _refuse_ignored(view: BundleView, estimator: Any) -> None:

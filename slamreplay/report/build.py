@@ -7,6 +7,7 @@ from typing import Any
 from slamreplay import __version__
 from slamreplay.bundle.findings import Finding
 from slamreplay.report.assess import title_of
+from slamreplay.report.build_ledger import jump_parts, ledger_part, trace_part
 from slamreplay.report.evidence import Postmortem, TrialResult
 from slamreplay.report.model import (
     SCHEMA_VERSION,
@@ -79,6 +80,9 @@ def build(post: Postmortem) -> Report:
         ],
         findings=[_finding(f) for f in post.findings],
         trials=[_trial(t) for t in post.trials],
+        ledger=ledger_part(post),
+        jumps=jump_parts(post),
+        trace=trace_part(post),
     )
 
 

@@ -12,13 +12,16 @@ from numpy.typing import ArrayLike, NDArray
 from slamreplay.bundle.findings import Finding
 from slamreplay.bundle.manifest import Manifest
 from slamreplay.bundle.products import Hindsight
-from slamreplay.bundle.run import Run
+from slamreplay.bundle.run import Run, Trial
 from slamreplay.bundle.track import PoseTrack
+from slamreplay.consistency.belief.jumps.found import Jump
 from slamreplay.consistency.belief.summary import ConsistencySummary
 from slamreplay.consistency.evidence.nees import Nees
 from slamreplay.geometry import se2
 from slamreplay.geometry.times import seconds_since
 from slamreplay.maps.grid import OccupancyGrid
+from slamreplay.report.ledger import LedgerSet, ledger_sets
+from slamreplay.report.trace import RunTrace, trace
 from slamreplay.verdict.judgement import ConstantOffset, Judgement
 from slamreplay.verdict.limits import Limits
 from slamreplay.verdict.reliability import Reliability, measured_reliability
@@ -51,6 +54,9 @@ class Postmortem:
         nees: of the belief at its own updates, None without covariance or reference.
         consistency: the belief's covariance against every source that can tell, the best first.
         trials: perturbation trials, baseline first.
+        recorded: the localizer of the log as runs, where the trials have none of it.
+        jumps: of each run, the recorded ones first, the steps of its path and their causes.
+        trace_ns: the moment around which is asked what moved the belief, None if nobody asked.
         reliability: how often what was said with a confidence was right, as measured.
     """
 
@@ -68,11 +74,26 @@ class Postmortem:
     nees: Nees | None = None
     consistency: tuple[ConsistencySummary, ...] = ()
     trials: tuple[TrialResult, ...] = ()
+    recorded: tuple[Run, ...] = ()
+    jumps: tuple[tuple[Trial, tuple[Jump, ...]], ...] = ()
+    trace_ns: int | None = None
     reliability: Reliability = field(default_factory=measured_reliability)
 
     def seconds(self, t_ns: ArrayLike) -> se2.Array:
         """Seconds since the log's start, for text and figures."""
         return seconds_since(t_ns, self.manifest.start_ns)
+
+    @cached_property
+    def ledger(self) -> tuple[LedgerSet, ...]:
+        """What every measurement of every run did, the recorded localizer first."""
+        return ledger_sets([*self.recorded, *(result.run for result in self.trials)])
+
+    @cached_property
+    def traces(self) -> tuple[RunTrace, ...]:
+        """What moved the belief of each run around the moment that was asked for."""
+        if self.trace_ns is None:
+            return ()
+        return trace([*self.recorded, *(result.run for result in self.trials)], self.trace_ns)
 
     @property
     def drawn_from_ns(self) -> int:

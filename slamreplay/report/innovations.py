@@ -9,6 +9,7 @@ from slamreplay.consistency.innovations.nis import nis_tests
 from slamreplay.consistency.innovations.whiteness import LEAST, whiteness
 from slamreplay.consistency.statistics.mean_test import MeanTest
 from slamreplay.report.evidence import Postmortem
+from slamreplay.report.ledger import LEDGER_FILE
 from slamreplay.report.phrases import NOT_KNOWN, number, percent
 from slamreplay.report.tables import Cell, Table, table
 
@@ -25,7 +26,7 @@ def innovations(post: Postmortem) -> Table:
         if run.estimate is not None:
             for seen in innovation_sets(run.estimate.innovations):
                 rows += _rows(_name(run.trial, len(seeds) > 1), seen)
-    return table(_HEAD, rows)
+    return table(_HEAD, rows, LEDGER_FILE)
 
 
 def _name(trial: Trial, with_seed: bool) -> str:

@@ -194,6 +194,96 @@ class TrialPart(_Strict):
     metrics: dict[str, bool | Number]
 
 
+class LedgerSourcePart(_Strict):
+    """One source of one run's ledger: how many rows, and the one that moved the belief most.
+
+    `axes` are names and units of its residual; `mean_nis` is null where S is not what the estimator
+    predicted. `largest_*` are null where no row is known to have moved it.
+    """
+
+    estimator: Text
+    perturbation: str | None
+    level: Number
+    unit: Text
+    seed: Ns
+    source: Text
+    frame_id: Text
+    axes: list[Text]
+    rows: Ns
+    accepted: Ns
+    predicted: bool
+    mean_nis: Number
+    largest_t_ns: Count
+    largest_m: Number
+    largest_rad: Number
+
+
+class LedgerPart(_Strict):
+    """What every measurement did: `file` beside report.json has the rows, null without any."""
+
+    file: str | None
+    rows: Ns
+    sources: list[LedgerSourcePart]
+
+
+class JumpPart(_Strict):
+    """A step of a run's path beyond what odometry tells, and what made it.
+
+    `before_ns` is the last moment before it; `error_*_m` by the best reference, null without one.
+    """
+
+    estimator: Text
+    perturbation: str | None
+    level: Number
+    unit: Text
+    before_ns: Ns
+    t_ns: Ns
+    metres: Number
+    radians: Number
+    cause: Text
+    given: bool
+    error_before_m: Number
+    error_after_m: Number
+
+
+class TraceRowPart(_Strict):
+    """A measurement: what it said, and how far it moved the belief (null: not known).
+
+    `residual` is measured minus predicted in `axes`, `sigma` the square roots of S's diagonal.
+    """
+
+    t_ns: Ns
+    source: Text
+    frame_id: Text
+    about: Text
+    accepted: bool
+    score: Number
+    nis: Number
+    axes: list[Text]
+    residual: list[Number]
+    sigma: list[Number]
+    moved_m: Number
+    moved_rad: Number
+
+
+class TraceRunPart(_Strict):
+    """One run's measurements around the moment, those that moved the belief most first."""
+
+    estimator: Text
+    perturbation: str | None
+    level: Number
+    unit: Text
+    rows: list[TraceRowPart]
+
+
+class TracePart(_Strict):
+    """What `--trace` asked for: the measurements within `window_ns` of `t_ns`, else the nearest."""
+
+    t_ns: Ns
+    window_ns: Ns
+    runs: list[TraceRunPart]
+
+
 class Report(_Strict):
     """report.json."""
 
@@ -209,6 +299,9 @@ class Report(_Strict):
     actions: list[ActionPart]
     findings: list[FindingPart]
     trials: list[TrialPart]
+    ledger: LedgerPart
+    jumps: list[JumpPart]
+    trace: TracePart | None
 
     def json_text(self) -> str:
         """The file's text; NaN cannot occur in it."""

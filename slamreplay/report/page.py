@@ -8,7 +8,7 @@ from datetime import UTC, datetime
 from slamreplay import __version__
 from slamreplay.bundle.manifest import Manifest, MapVersion
 from slamreplay.geometry.times import NS_PER_S
-from slamreplay.report import consistency_tables, phrases, tables
+from slamreplay.report import consistency_tables, phrases, tables, trace_tables
 from slamreplay.report.assess import not_assessable, title_of
 from slamreplay.report.evidence import Postmortem
 from slamreplay.report.facts import Fact, deciding_facts
@@ -18,6 +18,9 @@ from slamreplay.report.phrases import percent, seconds
 from slamreplay.report.tables import Table, table
 from slamreplay.report.timeline import Band, bands, marks
 from slamreplay.report.words import FAILURE_MODES, STATES, StateWords
+
+#: Where the rows of the log's own description are.
+_MANIFEST = "the bundle's manifest.json"
 
 
 @dataclass(frozen=True)
@@ -46,6 +49,9 @@ class Page:
     regions: Table
     trials: Table
     innovations: Table
+    jumps: Table
+    traces: tuple[tuple[str, Table], ...]
+    trace_note: str
     findings: tuple[FindingRow, ...]
     unasked: tuple[tuple[str, str, str], ...]
     missing: tuple[tuple[str, str, str], ...]
@@ -97,6 +103,9 @@ def page(post: Postmortem) -> Page:
         regions=tables.regions(post),
         trials=tables.trials(post),
         innovations=innovations(post),
+        jumps=trace_tables.jumps(post),
+        traces=trace_tables.traces(post),
+        trace_note=trace_tables.trace_note(post),
         findings=finding_rows(post),
         unasked=tuple((i, title_of(i), why) for i, why in not_assessable(post).items()),
         missing=tuple((m.part, m.reason, m.consequence) for m in manifest.missing),
@@ -104,6 +113,7 @@ def page(post: Postmortem) -> Page:
         roles=table(
             ("role", "topic", "type", "messages", "why this one"),
             [(r.role, r.topic, r.type, f"{r.messages}", r.reason) for r in manifest.roles],
+            _MANIFEST,
         ),
         frames=table(
             ("parent", "child", "kind", "samples"),
@@ -111,10 +121,12 @@ def page(post: Postmortem) -> Page:
                 (e.parent, e.child, "static" if e.is_static else "moving", f"{e.samples}")
                 for e in manifest.frames.tree
             ],
+            _MANIFEST,
         ),
         losses=table(
             ("kind", "what", "count", "why"),
             [(x.kind, x.what, f"{x.count}", x.reason) for x in manifest.losses],
+            _MANIFEST,
         ),
         sources=table(
             ("file", "format", "bytes", "sha256"),

@@ -12,7 +12,7 @@ from slamreplay.report.phrases import NOT_KNOWN, number, percent, seconds, short
 from slamreplay.report.words import STATES
 from slamreplay.verdict.judgement import Consumed
 
-#: Rows of one table on the page; report.json has them all.
+#: Rows of one table on the page; a file beside it has them all.
 MOST_ROWS = 40
 
 
@@ -43,20 +43,23 @@ class Cell:
 
 @dataclass(frozen=True)
 class Table:
-    """Cells under a head, and how many rows were left out."""
+    """Cells under a head, how many rows were left out, and the file that has them."""
 
     head: tuple[str, ...]
     rows: tuple[tuple[Cell, ...], ...]
     more: int = 0
+    more_in: str = "report.json"
 
 
-def table(head: tuple[str, ...], rows: Sequence[Sequence[str | Cell]]) -> Table:
-    """A table of the first rows; the rest is counted."""
+def table(
+    head: tuple[str, ...], rows: Sequence[Sequence[str | Cell]], more_in: str = "report.json"
+) -> Table:
+    """A table of the first rows; the rest is counted, and named the file that has it."""
     shown = tuple(
         tuple(cell if isinstance(cell, Cell) else Cell(cell) for cell in row)
         for row in rows[:MOST_ROWS]
     )
-    return Table(head, shown, max(0, len(rows) - MOST_ROWS))
+    return Table(head, shown, max(0, len(rows) - MOST_ROWS), more_in)
 
 
 def intervals(post: Postmortem) -> Table:

@@ -12,12 +12,15 @@ from slamreplay.report.evidence import Postmortem
 from slamreplay.report.freshness_file import FRESHNESS_FILE, freshness_bytes
 from slamreplay.report.html import html
 from slamreplay.report.junit import junit_xml
+from slamreplay.report.ledger import LEDGER_FILE, ledger_bytes
 
 MARKER = "report.json"
 
 
 def write_report(post: Postmortem, target: Path) -> Path:
-    """Write report.html, report.json, junit.xml; with a map also trajectory, changes, freshness.
+    """Write report.html, report.json, junit.xml; the ledger where one was kept.
+
+    With a map also trajectory, changes and freshness.
 
     Args:
         post: the post-mortem; the same one gives the same bytes.
@@ -34,6 +37,8 @@ def write_report(post: Postmortem, target: Path) -> Path:
         "report.html": html(post).encode(),
         "junit.xml": junit_xml(post).encode(),
     }
+    if post.ledger:
+        content[LEDGER_FILE] = ledger_bytes(post.ledger, clock=post.manifest.clock.name)
     if post.hindsight is not None:
         content[TRAJECTORY_FILE] = tum(post.hindsight.track).encode()
     if post.grid is not None:

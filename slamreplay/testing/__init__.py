@@ -5,6 +5,7 @@ from slamreplay.testing.checks import check_check
 from slamreplay.testing.conformance import ConformanceError
 from slamreplay.testing.decoders import check_decoder
 from slamreplay.testing.estimators import check_estimator
+from slamreplay.testing.matched import check_noise
 from slamreplay.testing.perturbations import check_perturbation
 from slamreplay.testing.synthetic import synthetic_bundle
 
@@ -14,6 +15,7 @@ __all__ = [
     "check_check",
     "check_decoder",
     "check_estimator",
+    "check_noise",
     "check_perturbation",
     "synthetic_bundle",
 ]

@@ -11,14 +11,17 @@ from typing import Any
 
 import numpy as np
 
-from slamreplay.bundle.run import Estimate, Run, Trial, run_bytes
+from slamreplay.bundle.run import Estimate, Innovations, Run, Trial, run_bytes
 from slamreplay.bundle.scans import scan_set
+from slamreplay.bundle.track import PoseTrack
 from slamreplay.bundle.view import Bundle, BundleView
 from slamreplay.errors import SlamreplayError
 from slamreplay.geometry import se2
 from slamreplay.geometry.times import NS_PER_S
+from slamreplay.replay.metrics import judging_reference
 from slamreplay.testing import edits
 from slamreplay.testing.conformance import demand, demand_frozen_dataclass, untouched_global_rng
+from slamreplay.testing.ledgers import check_ledger, ledger_before
 from slamreplay.testing.synthetic import synthetic_bundle
 
 PARTS = ("odometry", "scans", "map", "sightings", "localizer")
@@ -35,6 +38,7 @@ def check_estimator(
     seed: int = 1,
     tolerance_m: float = 1e-6,
     tolerance_rad: float = 1e-6,
+    tolerance_nees: float | None = None,
 ) -> None:
     """Raise ConformanceError at the first part of the contract that the estimator breaks.
 
@@ -47,6 +51,8 @@ def check_estimator(
         tolerance_m: by how much (median over rows) poses may fail to follow the map frame when it
             is moved. For sampling methods: their noise.
         tolerance_rad: the same for headings.
+        tolerance_nees: by which factor (median over rows) NEES against the reference may change
+            meanwhile; by default 1.001, and 3 where positions may miss by a centimetre and more.
     """
     bundle = synthetic_bundle(seconds=8.0, with_tags=True) if bundle is None else bundle
     demand_frozen_dataclass(estimator)
@@ -70,10 +76,15 @@ def check_estimator(
     _same_seed_gives_same_bits(estimator, baseline, run(bundle))
     _rows_follow_the_scans(estimator, bundle, baseline)
     _covariances_are_covariances(estimator, baseline)
+    check_ledger(estimator.name, baseline, bundle)
     _references_are_not_read(estimator, baseline, run(edits.poisoned(bundle)))
     if getattr(estimator, "causal", True):
         _the_past_ignores_the_future(estimator, bundle, baseline, run)
-    _estimates_move_with_the_world(estimator, bundle, baseline, run, tolerance_m, tolerance_rad)
+    if tolerance_nees is None:
+        tolerance_nees = 1.001 if tolerance_m < 0.01 else 3.0
+    _estimates_move_with_the_world(
+        estimator, bundle, baseline, run, (tolerance_m, tolerance_rad, tolerance_nees)
+    )
     _settings_are_honoured(estimator, bundle, baseline, run)
     _needs_are_honest(estimator, bundle, run)
     _damage_is_marked(estimator, bundle, run)
@@ -135,7 +146,8 @@ def _the_past_ignores_the_future(
 ) -> None:
     t_ns = baseline.track.t_ns
     middle = int(t_ns[0] + (t_ns[-1] - t_ns[0]) * 5 // 8)
-    early = run(edits.cut(bundle, middle)).track
+    cut = run(edits.cut(bundle, middle))
+    early = cut.track
     past = t_ns < middle - NS_PER_S
     count = int(past.sum())
     same = (
@@ -143,6 +155,9 @@ def _the_past_ignores_the_future(
         and early.cov[:count].tobytes() == baseline.track.cov[past].tobytes()
     )
     demand(same, f"{estimator.name} is not causal: cutting the future changes the past")
+    # What is not there before the cut differs in number only where it is of the future.
+    whole, part = (ledger_before(e, middle - NS_PER_S) for e in (baseline, cut))
+    demand(whole == part, f"{estimator.name}: cutting the future changes the ledger of the past")
 
 
 def _estimates_move_with_the_world(
@@ -150,21 +165,40 @@ def _estimates_move_with_the_world(
     bundle: Bundle,
     baseline: Estimate,
     run: _Runner,
-    tolerance_m: float,
-    tolerance_rad: float,
+    tolerances: tuple[float, float, float],
 ) -> None:
     if baseline.track.frame_id != bundle.manifest.frames.map:
         return
-    there = run(edits.moved(bundle, ELSEWHERE)).track
+    elsewhere = edits.moved(bundle, ELSEWHERE)
+    there = run(elsewhere).track
     off = se2.between(se2.compose(ELSEWHERE, baseline.track.xyyaw), there.xyyaw)
     both = np.isfinite(off).all(axis=1)
     demand(both.any(), f"{estimator.name} loses its poses when the map frame lies elsewhere")
     distance = float(np.median(np.hypot(off[both, 0], off[both, 1])))
     turn = float(np.median(np.abs(off[both, 2])))
     demand(
-        distance <= tolerance_m and turn <= tolerance_rad,
+        distance <= tolerances[0] and turn <= tolerances[1],
         f"{estimator.name} does not follow a moved map frame: {distance:g} m, {turn:g} rad off",
     )
+    here, moved = (_nees(t, b) for t, b in ((baseline.track, bundle), (there, elsewhere)))
+    told = (here > 0.0) & (moved > 0.0)
+    if told.any():
+        factor = float(np.exp(np.median(np.abs(np.log(moved[told] / here[told])))))
+        demand(
+            factor <= tolerances[2],
+            f"{estimator.name}: NEES changes by a factor of {factor:.3g} where the map frame lies "
+            "elsewhere: its covariance does not turn with it",
+        )
+
+
+def _nees(track: PoseTrack, bundle: Bundle) -> se2.Array:
+    """(N,) against the reference that judges, NaN where that or a covariance is missing."""
+    truth = judging_reference(bundle)
+    if truth is None:
+        return np.full(len(track), np.nan)
+    error = track.xyyaw - truth.at(track.t_ns).xyyaw
+    error[:, 2] = se2.wrap_angle(error[:, 2])
+    return Innovations("", track.t_ns, error, track.cov, np.ones(len(track), dtype=bool)).nis
 
 
 def _settings_are_honoured(
@@ -207,6 +241,7 @@ def _damage_is_marked(estimator: Any, bundle: Bundle, run: _Runner) -> None:
             continue  # said so: that is allowed
         _covariances_are_covariances(estimator, estimate)
         _rows_follow_the_scans(estimator, evidence, estimate)
+        check_ledger(estimator.name, estimate, evidence)
         demand(
             estimate.track.has_pose[-1],
             f"{estimator.name} has no pose any more after {what}",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,8 +32,14 @@ __all__ = [
     "RANGE_MAX_M",
     "START_NS",
     "TAGS_XYYAW",
+    "odometry_rows",
+    "pose_rows",
     "room_grid",
+    "scan_rows",
+    "sighting_rows",
+    "survey_rows",
     "synthetic_bundle",
+    "synthetic_manifest",
     "true_path",
 ]
 
@@ -115,9 +121,9 @@ def synthetic_bundle(
     T_map_base = se2.compose(true_path(belief_s), off + noise)
 
     tables = {
-        "scans": _scans(scan_s, seen, rng),
-        "odometry": _odometry(odometry_s, T_odom_base),
-        "references": _poses("references", "/truth", odometry_s, true_path(odometry_s), 1e-6),
+        "scans": scan_rows(scan_s, true_path(scan_s), seen, rng),
+        "odometry": odometry_rows(odometry_s, T_odom_base),
+        "references": pose_rows("references", "/truth", odometry_s, true_path(odometry_s), 1e-6),
     }
     transforms = [
         tf_rows("odom", "base_link", odometry_s, T_odom_base),
@@ -126,25 +132,28 @@ def synthetic_bundle(
     if with_belief:
         T_map_odom = se2.compose(T_map_base, se2.inverse(at_belief))
         transforms.append(tf_rows("map", "odom", belief_s, T_map_odom, ahead_s=0.1))
-        tables["poses"] = _poses("poses", "/amcl_pose", belief_s, T_map_base, 1e-3)
+        tables["poses"] = pose_rows("poses", "/amcl_pose", belief_s, T_map_base, 1e-3)
     if with_initial_pose:
         start = se2.compose(true_path(np.zeros(1)), np.array([0.1, -0.1, 0.05]))
-        tables["initial_poses"] = _poses("initial_poses", "/initialpose", np.zeros(1), start, 0.05)
+        tables["initial_poses"] = pose_rows(
+            "initial_poses", "/initialpose", np.zeros(1), start, 0.05
+        )
     if with_tags:
-        tags = _sightings(np.arange(0.0, seconds, 0.25), seed)
+        # Its own generator: whether tags are seen leaves all other noise as it is.
+        tag_s, own = np.arange(0.0, seconds, 0.25), np.random.Generator(np.random.PCG64([seed, 1]))
+        tags = sighting_rows(tag_s, true_path(tag_s), _tag_noise, own)
         tables["references"] = Table.concat(TABLES["references"], [tables["references"], tags])
-        for k, place in enumerate(se2.compose(room_grid().origin_xyyaw, np.nan_to_num(TAGS_XYYAW))):
-            tag = tf_rows("map", f"tag_{k}", np.zeros(1), place[None], is_static=True)
-            transforms.append(tag)
+        transforms += survey_rows()
     tables["transforms"] = Table.concat(TABLES["transforms"], transforms)
     grids = {room_grid().version: room_grid()} if with_map else {}
-    manifest = _manifest(tables, identity, seconds, with_map, with_belief)
+    manifest = synthetic_manifest(tables, identity, seconds, with_map, with_belief)
     return Bundle(manifest, tables, grids)
 
 
-def _manifest(
+def synthetic_manifest(
     tables: dict[str, Table], identity: str, seconds: float, with_map: bool, with_belief: bool
 ) -> Manifest:
+    """What the bundle says of itself; `identity` makes its id."""
     roles = {"scans": "scan", "odometry": "odometry", "references": "reference"}
     roles |= {"initial_poses": "initial_pose"} if "initial_poses" in tables else {}
     found = [(role, str(tables[name]["topic"][0])) for name, role in roles.items()]
@@ -204,9 +213,12 @@ def _drifting(xyyaw: se2.Array, rng: np.random.Generator) -> se2.Array:
     return out
 
 
-def _scans(t_s: NDArray[np.float64], world: OccupancyGrid, rng: np.random.Generator) -> Table:
+def scan_rows(
+    t_s: NDArray[np.float64], where: se2.Array, world: OccupancyGrid, rng: np.random.Generator
+) -> Table:
+    """What a laser sees of a world from poses (N, 3) of the base, with 1 cm of noise."""
     angle_min, step = -2.2, 4.4 / (_BEAMS - 1)
-    laser = se2.compose(true_path(t_s), MOUNT_XYYAW)
+    laser = se2.compose(where, MOUNT_XYYAW)
     ranges = cast_rays(
         world, laser, angle_min + step * np.arange(_BEAMS, dtype=np.float64), RANGE_MAX_M
     )
@@ -226,14 +238,39 @@ def _scans(t_s: NDArray[np.float64], world: OccupancyGrid, rng: np.random.Genera
     )
 
 
-def _sightings(t_s: NDArray[np.float64], seed: int) -> Table:
-    """What a camera in the base's origin sees of the tags: 2 cm, 0.01 rad, headings 0.03 rad."""
-    rng = np.random.Generator(np.random.PCG64([seed, 1]))  # leaves all other noise as it is
+def survey_rows() -> list[Table]:
+    """Static transforms from the map to the tags."""
+    places = se2.compose(room_grid().origin_xyyaw, np.nan_to_num(TAGS_XYYAW))
+    return [
+        tf_rows("map", f"tag_{k}", np.zeros(1), place[None], is_static=True)
+        for k, place in enumerate(places)
+    ]
+
+
+def _tag_noise(reach: NDArray[np.float64]) -> se2.Array:
+    """2 cm, 0.01 rad, and headings 0.03 rad."""
+    return np.tile([0.02, 0.01, 0.03], (len(reach), 1))
+
+
+def sighting_rows(
+    t_s: NDArray[np.float64],
+    where: se2.Array,
+    sigma: Callable[[NDArray[np.float64]], se2.Array],
+    rng: np.random.Generator,
+) -> Table:
+    """What a camera in the base's origin sees of the tags.
+
+    Args:
+        t_s: (N,) when it looks, s.
+        where: (N, 3) the base then.
+        sigma: of range m, bearing rad and heading rad (M, 3) by range (M,).
+        rng: of the noise.
+    """
     there = se2.compose(room_grid().origin_xyyaw, TAGS_XYYAW)
-    seen = se2.between(true_path(t_s)[:, None], there[None])
+    seen = se2.between(where[:, None], there[None])
     reach, bearing = np.hypot(seen[..., 0], seen[..., 1]), np.arctan2(seen[..., 1], seen[..., 0])
     row, tag = np.nonzero((reach < _SEEN_M) & (np.abs(bearing) < _SEEN_RAD))
-    noise = rng.normal(0.0, [0.02, 0.01, 0.03], (len(row), 3))
+    noise = rng.normal(0.0, 1.0, (len(row), 3)) * sigma(reach[row, tag])
     reach, bearing = reach[row, tag] + noise[:, 0], bearing[row, tag] + noise[:, 1]
     xyyaw = np.column_stack(
         [reach * np.cos(bearing), reach * np.sin(bearing), seen[row, tag, 2] + noise[:, 2]]
@@ -250,7 +287,8 @@ def _sightings(t_s: NDArray[np.float64], seed: int) -> Table:
     )
 
 
-def _odometry(t_s: NDArray[np.float64], xyyaw: se2.Array) -> Table:
+def odometry_rows(t_s: NDArray[np.float64], xyyaw: se2.Array) -> Table:
+    """The topic of odometry at 20 Hz, of poses (N, 3) in its own frame."""
     speed = np.linalg.norm(np.gradient(xyyaw[:, :2], 0.05, axis=0), axis=1)
     turn = np.gradient(np.unwrap(xyyaw[:, 2]), 0.05)
     zero = np.zeros_like(speed)
@@ -268,9 +306,10 @@ def _odometry(t_s: NDArray[np.float64], xyyaw: se2.Array) -> Table:
     )
 
 
-def _poses(
+def pose_rows(
     name: str, topic: str, t_s: NDArray[np.float64], xyyaw: se2.Array, variance: float
 ) -> Table:
+    """Poses (N, 3) in the map as a table of that name: variance m^2, a quarter of it rad^2."""
     extra = {
         "references": {"kind": "simulation", "child_frame_id": "base_link"},
         "poses": {"source": topic, "child_frame_id": "base_link"},

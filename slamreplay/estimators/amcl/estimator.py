@@ -46,6 +46,9 @@ class Amcl:
     name: ClassVar[str] = "amcl"
     needs: ClassVar[frozenset[str]] = frozenset({"odometry", "scans", "map"})
     settings: ClassVar[frozenset[str]] = frozenset({OFFSET, ROTATE, GLOBAL})
+    without_noise: ClassVar[str] = (
+        "a likelihood field is no model of ranges, so that no world has the noise it takes"
+    )
 
     @classmethod
     def from_parameters(cls, given: Mapping[str, object]) -> Self:

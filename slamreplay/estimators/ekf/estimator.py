@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields, replace
+from difflib import get_close_matches
 from types import MappingProxyType
-from typing import ClassVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,10 +17,17 @@ from slamreplay.bundle.scans import scan_set
 from slamreplay.bundle.sightings import sightings_of
 from slamreplay.bundle.track import PoseTrack
 from slamreplay.bundle.view import BundleView
-from slamreplay.errors import NotApplicableError
+from slamreplay.errors import NotApplicableError, UsageError
 from slamreplay.estimators.ekf import kernels
 from slamreplay.estimators.ekf.filter import filtered, gates_of
 from slamreplay.estimators.ekf.gyro import gyro_of
+from slamreplay.estimators.ekf.node.parameters import (
+    LIVE,
+    NodeParameters,
+    names_of_inputs,
+    node_parameters,
+)
+from slamreplay.estimators.ekf.node.run import run_node
 from slamreplay.estimators.ekf.noise import Noise
 from slamreplay.estimators.ekf.observations import Observations, after_motion, observations_of
 from slamreplay.estimators.ekf.passing import Evidence, Filtered, Held
@@ -29,6 +38,12 @@ from slamreplay.estimators.start import DEFAULT_COV, GLOBAL, OFFSET, ROTATE, Sta
 #: Settings a perturbation may change: ratios of the covariances that the filter is told.
 PROCESS_NOISE, MEASUREMENT_NOISE = "process_noise_scale", "measurement_noise_scale"
 SETTINGS = frozenset({OFFSET, ROTATE, GLOBAL, PROCESS_NOISE, MEASUREMENT_NOISE})
+#: Names that nodes of robot_localization have in its own files, and often elsewhere.
+NODES = (
+    "ekf", "ekf_node", "ekf_filter_node", "ekf_localization", "ekf_localization_node", "ekf_se",
+    "ekf_filter_node_odom", "ekf_filter_node_map", "ekf_se_odom", "ekf_se_map",
+    "ekf_localization_odom", "ekf_localization_map", "robot_localization",
+)  # fmt: skip
 #: Axes of the innovations: what they measure and its unit.
 AXES = ("range m", "bearing rad", "heading rad")
 FIX_AXES, TURN_AXES = ("x m", "y m"), ("turn rad",)
@@ -50,16 +65,51 @@ class Ekf:
             rejected by their NIS.
         update_min_d: a thing is taken in again after driving this far, m,
         update_min_a: or turning by this much, rad.
+        node: parameters of an `ekf_node` of robot_localization: it is replayed with the inputs that
+            they choose, and nothing of the above counts; None for the filter of this project.
     """
 
     noise: Noise = field(default_factory=Noise)
     gate_probability: float = 0.999
     update_min_d: float = 0.01
     update_min_a: float = 0.01
+    node: NodeParameters | None = None
 
     name: ClassVar[str] = "ekf"
     needs: ClassVar[frozenset[str]] = frozenset({"odometry"})
     settings: ClassVar[frozenset[str]] = SETTINGS
+    parameter_nodes: ClassVar[tuple[str, ...]] = NODES
+    live_parameters: ClassVar[tuple[str, ...]] = LIVE
+
+    @classmethod
+    def from_parameters(cls, given: Mapping[str, object]) -> Self:
+        """With the parameters of an `ekf_node` of robot_localization, or of this filter.
+
+        Those of a node are known by its inputs (`odom0`, `imu0`, ...). Those of this filter are
+        its attributes and those of its noise, by their own names.
+
+        Raises:
+            UsageError: a parameter that there is not (with the nearest one), or a value that it
+                cannot have.
+        """
+        if names_of_inputs(given):
+            return cls(node=node_parameters(given))
+        own = {item.name for item in fields(cls)} - {"noise", "node"}
+        of_noise = {item.name for item in fields(Noise)}
+        values: dict[str, dict[str, Any]] = {"own": {}, "noise": {}}
+        for name, value in given.items():
+            if name not in own | of_noise:
+                known = sorted({*own, *of_noise, "odom0", "imu0", "pose0", "twist0"})
+                near = get_close_matches(name, known, n=1)
+                hint = (
+                    f"did you mean '{near[0]}'?" if near else f"there are: {', '.join(sorted(own))}"
+                )
+                raise UsageError(f"there is no parameter '{name}'", where=cls.name, hint=hint)
+            if isinstance(value, bool) or not isinstance(value, int | float):
+                raise UsageError(f"'{name}' is {value!r}: it should be a number", where=cls.name)
+            values["own" if name in own else "noise"][name] = float(value)
+        gates_of(values["own"].get("gate_probability", cls.gate_probability))
+        return cls(noise=Noise(**values["noise"]), **values["own"])
 
     def run(self, view: BundleView, *, seed: int) -> Estimate:  # noqa: ARG002 - nothing is random
         """One row per scan (per odometry sample without scans), NaN where there is no pose.
@@ -70,8 +120,10 @@ class Ekf:
 
         Raises:
             NotApplicableError: no odometry; or it is to start anywhere, and has no sighting of
-                anything with a surveyed place.
+                anything with a surveyed place. Of a node: none of its inputs is there.
         """
+        if self.node is not None:
+            return run_node(view, self.node, self.name, *scales_of(view))
         evidence = evidence_of(view, self)
         done = filtered(evidence, self.noise, gates_of(self.gate_probability), *scales_of(view))
         return estimate_of(view, evidence, done)
@@ -98,6 +150,7 @@ class EkfTuned:
     causal: ClassVar[bool] = False
     needs: ClassVar[frozenset[str]] = frozenset({"odometry", "sightings"})
     settings: ClassVar[frozenset[str]] = SETTINGS
+    without_noise: ClassVar[str] = "it fits its noise to the log, and a few seconds cannot tell it"
 
     def run(self, view: BundleView, *, seed: int) -> Estimate:  # noqa: ARG002 - nothing is random
         """As of the filter; scalars hold what was fitted, too, `fitted.range_per_m` for one.

@@ -32,7 +32,9 @@ _NEVER = np.iinfo(np.int64).min
 
 @dataclass(frozen=True, eq=False)
 class _Events:
-    """E moments in order of time, each a sighting, a fix or a row (the other indices are -1).
+    """E moments in order of time, each a measurement or a row (the other index is -1).
+
+    Of measurements the sightings come first, then the fixes.
 
     `turns` and `turn_variance` (E,) are the gyroscope's from the event before, NaN without it.
     """
@@ -41,9 +43,8 @@ class _Events:
     steps: Steps
     turns: se2.Array
     turn_variance: se2.Array
-    sighting: NDArray[np.int64]
+    measured: NDArray[np.int64]
     row: NDArray[np.int64]
-    fix: NDArray[np.int64]
 
     def __len__(self) -> int:
         return len(self.t_ns)
@@ -146,20 +147,24 @@ class _Pass:
         self.evidence, self.motion, self.noise, self.gates = evidence, motion, noise, gates
         self.events, self.silent = _events(evidence, motion, noise, process_scale)
         self.process_scale = process_scale
-        self.polar = seen.corrected(noise)
-        self.R = seen.covariance(noise, measurement_scale)
+        measured = self.events.measured
+        self.is_sighting = (measured >= 0) & (measured < len(seen))
+        fixes, M = evidence.fixes, len(seen)
+        F = 0 if fixes is None else len(fixes)
+        self.sensed, self.R = np.zeros((M + F, 3)), np.zeros((M + F, 3, 3))
+        self.sensed[:M], self.R[:M] = seen.corrected(noise), seen.covariance(noise)
+        self.dims = np.append(seen.dims, np.full(F, 2))
+        self.thing = np.append(seen.thing, np.full(F, -1))
+        t_ns, self.antenna = seen.t_ns, np.zeros(2)
+        if fixes is not None:
+            self.sensed[M:, :2], self.R[M:, :2, :2] = fixes.xy, fixes.cov
+            t_ns, self.antenna = np.append(t_ns, fixes.t_ns), fixes.antenna_xy
+        self.R *= measurement_scale
+        self.held = Held.none(t_ns, 3)
         lasting = np.array([noise.lasting_range_per_m, noise.lasting_bearing_rad]) ** 2
         self.lasting = measurement_scale * lasting
         self.xyyaw, self.cov = np.full((N, 3), np.nan), np.full((N, 3, 3), np.nan)
         self.updated = np.full(N, np.nan)
-        self.sighted = Held.none(seen.t_ns, 3)
-        no_fix = np.empty(0, dtype=np.int64)
-        fixes = evidence.fixes
-        self.fixed = Held.none(no_fix if fixes is None else fixes.t_ns, 2)
-        self.fixed_xy = np.empty((0, 2)) if fixes is None else fixes.xy
-        fixed_R = np.empty((0, 2, 2)) if fixes is None else fixes.cov
-        self.fixed_R = measurement_scale * fixed_R
-        self.antenna = np.zeros(2) if fixes is None else fixes.antenna_xy
         self.turned = Held.none(self.events.t_ns, 1)
         self.turn_out = np.full((len(self.events), 2), np.nan)
         self.bias = None if evidence.gyro is None else (0.0, noise.gyro_bias**2)
@@ -181,7 +186,7 @@ class _Pass:
 
     def search(self, first: int, end: int) -> tuple[int, _State | None]:
         """The state at the first event from which sightings tell it, and the event after that."""
-        for event in (first + np.flatnonzero(self.events.sighting[first:end] >= 0)).tolist():
+        for event in (first + np.flatnonzero(self.is_sighting[first:end])).tolist():
             if self.events.t_ns[event] >= self.retry_ns:
                 state = self._located(event)
                 if state is not None:
@@ -196,17 +201,16 @@ class _Pass:
 
     def follow(self, state: _State, first: int, end: int, *, starts: bool) -> int:
         """Run the filter from an event on; returns where it stopped: `end`, or behind a loss."""
-        events, seen = self.events, self.evidence.observations
+        events, seen, held = self.events, self.evidence.observations, self.held
         return int(
             kernels.run(
                 first, end, starts, events.t_ns, events.steps.xyyaw, events.steps.Q,
-                events.turns, events.turn_variance, events.sighting, events.row, events.fix,
-                self.polar, self.R, seen.dims, seen.thing, seen.places, self.fixed_xy,
-                self.fixed_R, self.antenna, self.gates, self.lasting, self.noise.lasting_s,
-                self.noise.gyro_bias_per_root_s**2, np.array([LOST_LEAST, LOST_NS]),
-                self.retry_ns, state.x, state.P, state.holder, state.seen, state.lost, self.xyyaw,
-                self.cov, self.updated, *_arrays(self.sighted), *_arrays(self.fixed),
-                self.turn_out, self.turned.status, self.turned.moved,
+                events.turns, events.turn_variance, events.measured, events.row, self.sensed,
+                self.R, self.dims, self.thing, seen.places, self.antenna, self.gates,
+                self.lasting, self.noise.lasting_s, self.noise.gyro_bias_per_root_s**2,
+                np.array([LOST_LEAST, LOST_NS]), self.retry_ns, state.x, state.P, state.holder,
+                state.seen, state.lost, self.xyyaw, self.cov, self.updated, held.residual, held.S,
+                held.status, held.moved, self.turn_out, self.turned.status, self.turned.moved,
             )
         )  # fmt: skip
 
@@ -215,8 +219,10 @@ class _Pass:
         turned = self.turned
         residual, S = self.turn_out[:, :1], self.turn_out[:, 1:, None]
         turned = Held(turned.t_ns, residual, S, turned.status, turned.moved)
+        M, all_ = len(self.evidence.observations), len(self.held.t_ns)
         return Filtered(
-            self.xyyaw, self.cov + self.mount, self.updated, self.sighted, self.fixed, turned,
+            self.xyyaw, self.cov + self.mount, self.updated, self.held.part(0, M, 3),
+            self.held.part(M, all_, 2), turned,
             np.nan if self.bias is None else self.bias[0], self.located, self.recoveries,
             self.silent,
         )  # fmt: skip
@@ -226,22 +232,22 @@ class _Pass:
         events, seen = self.events, self.evidence.observations
         self.retry_ns = int(events.t_ns[event]) + RETRY_NS
         first = np.searchsorted(events.t_ns, events.t_ns[event] - WINDOW_NS)
-        window = first + np.flatnonzero(events.sighting[first : event + 1] >= 0)
+        window = first + np.flatnonzero(self.is_sighting[first : event + 1])
         window = window[-WINDOW_MOST:]
-        rows = events.sighting[window]
+        rows = events.measured[window]
         if len(rows) < LEAST_AGREEING:
             return None
         steps = self.motion.steps(events.t_ns[window], self.noise)
         thing = seen.thing[rows]
         # Settings that are too sure of themselves must not keep a robot from finding its start.
-        R = np.maximum(self.R, seen.covariance(Noise()))[rows]
+        R = np.maximum(self.R[rows], seen.covariance(Noise())[rows])
         # A lasting error is one and the same in all sightings of a thing: they share its weight.
         times = (thing[:, None] == thing[None, :]).sum(axis=1)
-        R[:, 0, 0] += times * self.lasting[0] * self.polar[rows, 0] ** 2
+        R[:, 0, 0] += times * self.lasting[0] * self.sensed[rows, 0] ** 2
         R[:, 1, 1] += times * self.lasting[1]
         found = locate(
             window_of(
-                self.polar[rows], seen.dims[rows], R, seen.places[thing], thing, steps.xyyaw,
+                self.sensed[rows], seen.dims[rows], R, seen.places[thing], thing, steps.xyyaw,
                 self.process_scale * steps.Q,
             )
         )  # fmt: skip
@@ -251,10 +257,6 @@ class _Pass:
         state.lost[2] = 1
         self.located += 1
         return state
-
-
-def _arrays(held: Held) -> tuple[se2.Array, se2.Array, NDArray[np.int64], se2.Array]:
-    return held.residual, held.S, held.status, held.moved
 
 
 def _events(
@@ -277,9 +279,8 @@ def _events(
         Steps(steps.xyyaw, process_scale * steps.Q),
         turns,
         process_scale * turn_variance,
-        np.where(order < M, order, -1),
+        np.where(order < M + F, order, -1),
         np.where(order >= M + F, order - M - F, -1),
-        np.where((order >= M) & (order < M + F), order - M, -1),
     )
     return events, int((~known[: M + F]).sum())
 

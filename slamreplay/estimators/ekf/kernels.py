@@ -354,16 +354,13 @@ def run(  # type: ignore[no-untyped-def]  # noqa: C901 - the filter's loop
     Q,
     turns,
     turn_variance,
-    sighting,
+    measured,
     row,
-    fix,
     sensed,
     R,
     dims,
     things,
     places,
-    fixed_xy,
-    fixed_R,
     antenna,
     gates,
     lasting,
@@ -383,10 +380,6 @@ def run(  # type: ignore[no-untyped-def]  # noqa: C901 - the filter's loop
     S_out,
     status_out,
     moved_out,
-    fix_residual_out,
-    fix_S_out,
-    fix_status_out,
-    fix_moved_out,
     turn_out,
     turn_status_out,
     turn_moved_out,
@@ -399,14 +392,14 @@ def run(  # type: ignore[no-untyped-def]  # noqa: C901 - the filter's loop
     Args: `starts` says that the state is already that at the first event, and not at the one
     before it. Of the events (E,): t_ns, steps (E, 3) and Q (E, 3, 3) from the one before, `turns`
     (E,) of the gyroscope from the one before (NaN: none) and their variance `turn_variance` (E,);
-    `sighting`, `row` and `fix` the index of what happens there or -1. Of the sightings (M,):
-    `sensed` (M, 3), R (M, 3, 3), dims, things, and places (T, 3) of the things. Of the fixes
-    (F,): `fixed_xy` (F, 2), `fixed_R` (F, 2, 2), and the `antenna` (2,) in the base. `gates` (4,)
-    the largest NIS for each dimension. `lasting` (2,) variances of lasting errors, `lasting_s`
-    their time constant; `bias_walk` variance of the bias after a second. The state x (n,),
-    P (n, n), `holder` and `seen` (slots,), `lost` (3,): number and first time of the rejections in
-    a row, and whether anything was taken in since the last row. Outputs are filled in by row, by
-    sighting, by fix, and by event (`turn_*`); they and the state change in place.
+    `measured` and `row` the index of what happens there or -1. Of the measurements (M,), `sensed`
+    (M, 3), R (M, 3, 3), dims, and things: range, bearing and heading of a thing of the T in
+    `places` (T, 3), or, where that is -1, the x and y of the `antenna` (2,) in the base. `gates`
+    (4,) the largest NIS for each dimension. `lasting` (2,) variances of lasting errors,
+    `lasting_s` their time constant; `bias_walk` variance of the bias after a second. The state x
+    (n,), P (n, n), `holder` and `seen` (slots,), `lost` (3,): number and first time of the
+    rejections in a row, and whether anything was taken in since the last row. Outputs are filled in
+    by row, by measurement, and by event (`turn_*`); they and the state change in place.
     """
     n = len(x)
     end = 3 + 2 * len(holder)
@@ -424,51 +417,38 @@ def run(  # type: ignore[no-untyped-def]  # noqa: C901 - the filter's loop
                 if np.isfinite(turns[e]):
                     before[:] = x[:3]
                     turn_status_out[e] = turn_by_gyro(
-                        x,
-                        P,
-                        yaw,
-                        steps[e],
-                        Q[e],
-                        turns[e],
-                        turn_variance[e],
-                        dt,
-                        gates[1],
+                        x, P, yaw, steps[e], Q[e], turns[e], turn_variance[e], dt, gates[1],
                         turn_out[e],
-                    )
+                    )  # fmt: skip
                     turn_moved_out[e] = x[:3] - before
                     turn_moved_out[e, 2] = wrapped(turn_moved_out[e, 2])
-        s, k, f = sighting[e], row[e], fix[e]
+        s, k = measured[e], row[e]
         if k >= 0:
             xyyaw_out[k] = x[:3]
             cov_out[k] = P[:3, :3]
             updated_out[k] = lost[2]
             lost[2] = 0
-        if f >= 0:
-            of_point(x, antenna, H, expected)
-            for r in range(2):
-                residual[r] = fixed_xy[f, r] - expected[r]
-            fix_status_out[f] = take_in(
-                f, 2, gates[2], fixed_R[f], residual, x, P, H, HP, S, L, fix_residual_out,
-                fix_S_out, fix_moved_out,
-            )  # fmt: skip
-            if fix_status_out[f] == ACCEPTED:
-                lost[0], lost[2] = 0, 1
         if s < 0:
             continue
-        slot = slot_of(things[s], holder, seen, x, P, lasting)
-        if slot > 0:
-            seen[(slot - 3) // 2] = e
-        m = dims[s]
-        measurement(x, places[things[s]], slot, m, H, expected)
+        m, thing = dims[s], things[s]
+        if thing < 0:
+            of_point(x, antenna, H, expected)
+        else:
+            slot = slot_of(thing, holder, seen, x, P, lasting)
+            if slot > 0:
+                seen[(slot - 3) // 2] = e
+            measurement(x, places[thing], slot, m, H, expected)
         for r in range(m):
             residual[r] = sensed[s, r] - expected[r]
-            if r > 0:
+            if r > 0 and thing >= 0:
                 residual[r] = wrapped(residual[r])
         status_out[s] = take_in(
             s, m, gates[m], R[s], residual, x, P, H, HP, S, L, residual_out, S_out, moved_out
         )
         if status_out[s] == ACCEPTED:
             lost[0], lost[2] = 0, 1
+            continue
+        if thing < 0:
             continue
         if lost[0] == 0:
             lost[1] = t_ns[e]

@@ -71,6 +71,13 @@ class Held:
         residual, S = np.full((n, axes), np.nan), np.full((n, axes, axes), np.nan)
         return cls(t_ns, residual, S, np.zeros(n, dtype=np.int64), np.full((n, 3), np.nan))
 
+    def part(self, first: int, end: int, axes: int) -> Held:
+        """Those from `first` to before `end`, with their first axes."""
+        residual, S = self.residual[first:end, :axes], self.S[first:end, :axes, :axes]
+        return Held(
+            self.t_ns[first:end], residual, S, self.status[first:end], self.moved[first:end]
+        )
+
 
 @dataclass(frozen=True, eq=False)
 class Filtered:

@@ -90,9 +90,13 @@ def _jump(
     elif made:
         cause = made
     else:  # of runs only what they read of the log can move them beside their measurements
-        cause = "; ".join(_when(e, step) for e in near[:3]) or "nothing in its ledger explains it"
+        cause = "; ".join(_when(e, step) for e in near[:3]) or _unexplained(ledger)
     before, after = _errors(context, step)
     return Jump(step, cause, bool(near) and near[0].is_given and not made, before, after)
+
+
+def _unexplained(ledger: Sequence[Innovations]) -> str:
+    return "nothing in its ledger explains it" if ledger else "it keeps no ledger"
 
 
 def _made_by(step: Step, ledger: Sequence[Innovations]) -> str:

@@ -1,0 +1,1 @@
+"""Mapping and localization in sequence against both at once, from the same evidence."""

@@ -1,0 +1,104 @@
+"""The page's and the terminal's tables of jumps, and of what moved the belief around a moment."""
+
+from __future__ import annotations
+
+import math
+
+from slamreplay.report.evidence import Postmortem
+from slamreplay.report.ledger import LEDGER_FILE, run_name
+from slamreplay.report.phrases import NOT_KNOWN, number, seconds, short
+from slamreplay.report.tables import Cell, Table, table
+from slamreplay.report.trace import RunTrace, Traced
+
+_HEAD = ("when", "measured", "moved it by", "residual", "sigma of it", "NIS", "score", "used")
+#: Rows of one run on the page and in the terminal.
+_SHOWN = 12
+
+
+def jumps(post: Postmortem) -> Table:
+    """Every jump of every run, the recorded localizer first."""
+    rows = [
+        (
+            run_name(trial),
+            seconds(jump.step.t_ns - post.manifest.start_ns),
+            _moved(jump.step.metres, jump.step.radians),
+            _errors(jump.error_before_m, jump.error_after_m),
+            jump.cause,
+        )
+        for trial, found in post.jumps
+        for jump in found
+    ]
+    return table(("path", "when", "by", "off before and after", "what made it"), rows)
+
+
+def traces(post: Postmortem) -> tuple[tuple[str, Table], ...]:
+    """For each run its name and the rows around the moment that was asked for."""
+    return tuple((_title(one), _rows(post, one)) for one in post.traces)
+
+
+def trace_note(post: Postmortem) -> str:
+    """How to read the tables; empty where nothing was asked."""
+    if post.trace_ns is None:
+        return ""
+    when = seconds(post.trace_ns - post.manifest.start_ns)
+    if not post.traces:
+        return f"No run has a ledger that could tell what moved the belief around {when}."
+    return (
+        f"Measurements within 5 s of {when}, those that moved the belief most first. What a "
+        f"recorded localizer measured nobody recorded: only how far each of its words moved it. "
+        f"{LEDGER_FILE} has every row."
+    )
+
+
+def _title(one: RunTrace) -> str:
+    name = run_name(one.trial)
+    return name if one.near else f"{name}: nothing within 5 s, the nearest"
+
+
+def _rows(post: Postmortem, one: RunTrace) -> Table:
+    rows = [_row(post, traced) for traced in one.rows[:_SHOWN]]
+    shown = table(_HEAD, rows)
+    return Table(shown.head, shown.rows, max(0, len(one.rows) - _SHOWN), LEDGER_FILE)
+
+
+def _row(post: Postmortem, one: Traced) -> tuple[str | Cell, ...]:
+    seen = one.set
+    axes = [axis.rpartition(" ") for axis in seen.axes]
+    names = [name or unit for name, _, unit in axes]
+    units = [unit if name else "" for name, _, unit in axes]
+    residual = [float(r) for r in seen.residual[one.row]]
+    names = names if len(names) == len(residual) else [""] * len(residual)
+    units = units if len(units) == len(residual) else [""] * len(residual)
+    score = float(seen.score[one.row])
+    return (
+        seconds(one.t_ns - post.manifest.start_ns),
+        Cell(f"{seen.source} {seen.about[one.row]}".strip(), seen.frame_id),
+        _moved(one.metres, one.radians),
+        _numbers(residual, names, units),
+        _numbers(list(one.sigma), [""] * len(residual), units),
+        short(one.nis),
+        number(score, ".2f"),
+        "yes" if seen.accepted[one.row] else "no",
+    )
+
+
+def _numbers(values: list[float], names: list[str], units: list[str]) -> str:
+    if not any(math.isfinite(value) for value in values):
+        return NOT_KNOWN
+    words = []
+    for value, name, unit in zip(values, names, units, strict=True):
+        shown, factor = ("deg", math.degrees(1.0)) if unit == "rad" else (unit, 1.0)
+        words.append(f"{name} {number(factor * value, '.3g', shown)}".strip())
+    return ", ".join(words)
+
+
+def _moved(metres: float, radians: float) -> str:
+    if not math.isfinite(metres):
+        return NOT_KNOWN
+    return f"{number(metres, '.3f', 'm')}, {number(math.degrees(radians), '.1f', 'deg')}"
+
+
+def _errors(before_m: float | None, after_m: float | None) -> str:
+    if before_m is None or after_m is None:
+        return NOT_KNOWN
+    return f"{before_m:.2f} m, {after_m:.2f} m"
