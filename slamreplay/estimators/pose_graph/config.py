@@ -43,9 +43,9 @@ class GraphConfig:
     confirmations: int = 2
     gate: float = 16.27
     phi: float = 5.0
-    trust: float = 0.2
-    closure_m: float = 0.015
-    closure_rad: float = 0.004
+    trust: float = 0.5
+    closure_m: float = 0.01
+    closure_rad: float = 0.003
     rounds: int = 3
     pass_m: float = 2.0
     passes: int = 4
