@@ -22,6 +22,7 @@ ESTIMATOR_LINES = {
     "recorded": (1e-6, 1e-6),
     "recorded_pose": (1e-6, 1e-6),
     "recorded_tf": (1e-6, 1e-6),
+    "scan_matching": (1e-6, 1e-6),
 }
 
 #: Those that close loops are shown a lap and a half.
