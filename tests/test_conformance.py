@@ -9,6 +9,7 @@ from slamreplay.ingest import DECODERS
 from slamreplay.perturb import PERTURBATIONS
 from slamreplay.testing import check_decoder, check_estimator, check_noise, check_perturbation
 from slamreplay.testing.decoders import check_payload
+from slamreplay.testing.synthetic import synthetic_bundle
 
 #: Name, and by how much sampling noise lets its poses miss a moved map frame: m, rad.
 ESTIMATOR_LINES = {
@@ -16,10 +17,16 @@ ESTIMATOR_LINES = {
     "dead_reckoning": (1e-6, 1e-6),
     "ekf": (1e-6, 1e-6),
     "ekf_tuned": (1e-3, 1e-3),
+    "pose_graph": (0.02, 0.01),
+    "pose_graph_online": (0.02, 0.01),
     "recorded": (1e-6, 1e-6),
     "recorded_pose": (1e-6, 1e-6),
     "recorded_tf": (1e-6, 1e-6),
+    "scan_matching": (1e-6, 1e-6),
 }
+
+#: Those that close loops are shown a lap and a half.
+LAPS_S = {"pose_graph": 60.0, "pose_graph_online": 60.0}
 
 PERTURBATION_LINES = (
     "initial_pose",
@@ -666,7 +673,9 @@ DECODER_LINES = {
 @pytest.mark.parametrize("name", ESTIMATOR_LINES)
 def test_estimator(name):
     tolerance_m, tolerance_rad = ESTIMATOR_LINES[name]
-    check_estimator(ESTIMATORS.load(name)(), tolerance_m=tolerance_m, tolerance_rad=tolerance_rad)
+    bundle = synthetic_bundle(seconds=LAPS_S[name], with_tags=True) if name in LAPS_S else None
+    estimator = ESTIMATORS.load(name)()
+    check_estimator(estimator, bundle=bundle, tolerance_m=tolerance_m, tolerance_rad=tolerance_rad)
 
 
 @pytest.mark.parametrize("name", list(ESTIMATORS))

@@ -14,6 +14,7 @@ ESTIMATORS = Registry(
         "recorded": "slamreplay.estimators.recorded:Recorded",
         "recorded_pose": "slamreplay.estimators.recorded:RecordedPose",
         "recorded_tf": "slamreplay.estimators.recorded:RecordedTf",
+        "scan_matching": "slamreplay.estimators.scan_matching.estimator:ScanMatching",
     },
 )
 

@@ -29,6 +29,7 @@ class OnlineGraph:
         rules.relinearizeSkip = 1
         self._isam = gtsam.ISAM2(rules)
         self._count = 0
+        self._motions: list[tuple[int, Relations]] = []
         self._add([prior(xyyaw, cov)], xyyaw)
 
     def __len__(self) -> int:
@@ -47,17 +48,26 @@ class OnlineGraph:
         here = self._isam.calculateEstimatePose2(last)
         step = Relations(np.array([[last, last + 1]]), motion[None], cov[None])
         there = se2.compose(np.array([here.x(), here.y(), here.theta()]), motion)
-        self._add(factors_of(step), there)
+        numbers = self._add(factors_of(step), there)
+        self._motions.append((numbers[0], step))
+
+    def loosen(self, first: int, last: int, ratio: float) -> None:
+        """Multiply the covariances of the motions from pose `first` to `last`."""
+        old = [number for number, _ in self._motions[first:last]]
+        steps = [
+            Relations(step.pairs, step.xyyaw, step.cov * ratio)
+            for _, step in self._motions[first:last]
+        ]
+        numbers = self._add([f for step in steps for f in factors_of(step)], without=old)
+        self._motions[first:last] = list(zip(numbers, steps, strict=True))
 
     def close(self, relations: Relations) -> list[int]:
         """Add relations between poses that are there; their numbers, to take them out again."""
-        result = self._add(factors_of(relations))
-        return [int(k) for k in result.getNewFactorsIndices()]
+        return self._add(factors_of(relations))
 
     def undo(self, numbers: list[int]) -> None:
         """Take relations out again."""
-        self._isam.update(gtsam.NonlinearFactorGraph(), gtsam.Values(), numbers)
-        self._settle()
+        self._add([], without=numbers)
 
     def marginal(self, k: int) -> se2.Array:
         """(3, 3) covariance of pose k about the parent's axes."""
@@ -73,18 +83,21 @@ class OnlineGraph:
         )
 
     def _add(
-        self, factors: list[gtsam.NonlinearFactor], pose: se2.Array | None = None
-    ) -> gtsam.ISAM2Result:
+        self,
+        factors: list[gtsam.NonlinearFactor],
+        pose: se2.Array | None = None,
+        without: list[int] | None = None,
+    ) -> list[int]:
         graph, values = gtsam.NonlinearFactorGraph(), gtsam.Values()
         for factor in factors:
             graph.add(factor)
         if pose is not None:
             values.insert(self._count, gtsam.Pose2(*pose.tolist()))
             self._count += 1
-        result = self._isam.update(graph, values)
+        result = self._isam.update(graph, values, without or [])
         if pose is None:
             self._settle()
-        return result
+        return [int(k) for k in result.getNewFactorsIndices()]
 
     def _settle(self) -> None:
         before = self.poses

@@ -6,6 +6,9 @@ thin wall. The match is Gauss and Newton's on the distances of the scan's points
 nearest to them (Chen and Medioni 1992; Censi, An ICP variant using a point-to-line metric, ICRA
 2008) with Welsch's weights, which let a point that fits nothing count nothing, and a Gaussian
 prior.
+
+Points that lie on no line hold nothing: the farthest beams of a bare corridor end far apart, and
+if each were held to the last one near it, the robot would be, too.
 """
 
 from __future__ import annotations
@@ -23,11 +26,14 @@ CELL_M = 0.1
 SIDE = 1024
 #: A line is the mean of at most so many sightings, so that it can still follow.
 MOST_SIGHTINGS = 20.0
-#: A point that is on no line is held to one of the same kind this much less well.
-POINT_SIGMA = 3.0
 #: Faces farther apart than this (cosine) are not those of one surface.
 SAME_FACE = 0.5
-MOST_STEPS = 20
+#: Steps are kept within these, m and rad; the first ones look for lines one cell farther away.
+MOST_M, MOST_RAD, WIDE_STEPS = 0.2, 0.1, 4
+#: A step this small is the last, m.
+SMALL = 2e-4
+#: Width of a point's score.
+SCORE_M = 0.08
 
 
 @dataclass(eq=False)
@@ -61,14 +67,17 @@ class LineMap:
         """Forget everything."""
         self.now += self.memory + 1
 
-    def points(self) -> Array:
-        """(M, 2) what it holds."""
-        fresh = self.tags[..., 2] >= self.now - self.memory
-        return np.asarray(self.lines[fresh][:, :2])
+    def points(self, centre_xy: Array, radius_m: float) -> Array:
+        """(M, 2) what it holds in a square about a place (2,)."""
+        reach = int(radius_m / CELL_M)
+        out = np.empty((2 * (2 * reach + 1) ** 2, 2))
+        corner = np.floor(centre_xy / CELL_M).astype(np.int64) - reach
+        oldest = self.now - self.memory
+        return out[: _collect(self.tags, self.lines, oldest, corner, 2 * reach + 1, out)].copy()
 
 
 @njit(cache=True, nogil=True)
-def insert(tags, lines, now, memory, pose, points, normals):  # type: ignore[no-untyped-def]  # noqa: C901
+def insert(tags, lines, now, memory, pose, points, normals):  # type: ignore[no-untyped-def]
     """Merge each point with the line of its cell that faces the same way, or begin one."""
     cos, sin = np.cos(pose[2]), np.sin(pose[2])
     for p in range(points.shape[0]):
@@ -117,7 +126,22 @@ def insert(tags, lines, now, memory, pose, points, normals):  # type: ignore[no-
 
 
 @njit(cache=True, nogil=True)
-def _nearest(tags, lines, oldest, x, y, nx, ny, reach):  # type: ignore[no-untyped-def]  # noqa: C901
+def _collect(tags, lines, oldest, corner, side, out):  # type: ignore[no-untyped-def]
+    """Write the places of the lines in a square of cells; how many."""
+    count = 0
+    for row in range(corner[1], corner[1] + side):
+        for col in range(corner[0], corner[0] + side):
+            at = (row & (SIDE - 1)) * SIDE + (col & (SIDE - 1))
+            for face in range(2):
+                tag = tags[at, face]
+                if tag[2] >= oldest and tag[0] == col and tag[1] == row:
+                    out[count, 0], out[count, 1] = lines[at, face, 0], lines[at, face, 1]
+                    count += 1
+    return count
+
+
+@njit(cache=True, nogil=True)
+def _nearest(tags, lines, oldest, x, y, nx, ny, reach):  # type: ignore[no-untyped-def]
     """The nearest line within `reach` cells that may be the same surface: its place, or -1."""
     col, row = int(np.floor(x / CELL_M)), int(np.floor(y / CELL_M))
     is_line = nx != 0.0 or ny != 0.0
@@ -140,8 +164,8 @@ def _nearest(tags, lines, oldest, x, y, nx, ny, reach):  # type: ignore[no-untyp
 
 
 @njit(cache=True, nogil=True)
-def align(tags, lines, oldest, points, normals, pose, prior, held, sigma, part, out):  # type: ignore[no-untyped-def]  # noqa: C901
-    """Move `pose` to where the points lie on the lines; the information of the match alone.
+def align(tags, lines, oldest, points, normals, pose, prior, held, sigma, variance, steps, out):  # type: ignore[no-untyped-def]
+    """Move `pose` to where the points lie on the lines and the prior allows.
 
     Args:
         tags: of the map.
@@ -149,101 +173,108 @@ def align(tags, lines, oldest, points, normals, pose, prior, held, sigma, part, 
         oldest: number of the first node that still counts.
         points: (P, 2) of the scan, m.
         normals: (P, 2).
-        pose: (3,) first guess, moved in place.
+        pose: (3,) first guess, moved in place; its yaw is not wrapped.
         prior: (3,) where it is expected.
         held: (3, 3) information of that.
-        sigma: standard deviation of a point about its line, m.
-        out: (3, 3) written: information of the match were the variance of a point 1.
+        sigma: standard deviation of a point about its line, m: Welsch's weights begin with four
+            times and end with twice as much.
+        variance: of a point that counts for one, m^2.
+        steps: at the most; 0 only sums up at `pose`.
+        out: (4, 3) written: information of the match were the variance of a point 1, and scratch.
 
     Returns:
         Mean score of the points, mean weighted square of their distances (m^2), and how far the
         prior was trusted: Student's weight for 4 degrees of freedom, 1 where it fits.
     """
-    count = points.shape[0]
-    oxx = oxy = oxt = oyy = oyt = ott = 0.0
+    width, trust, moved = 4.0 * sigma, 1.0, np.inf
+    score, squares = _sum_up(tags, lines, oldest, points, normals, pose, width, 2, out)
+    for turn in range(steps):
+        trust, moved = _step(out, variance, prior, held, pose)
+        narrow = max(2.0 * sigma, 0.7 * width)
+        reach = 2 if turn < WIDE_STEPS else 1
+        is_done = moved < SMALL and narrow == width and turn >= WIDE_STEPS
+        width = narrow
+        score, squares = _sum_up(tags, lines, oldest, points, normals, pose, width, reach, out)
+        if is_done:
+            break
+    return score, squares, trust
+
+
+@njit(cache=True, nogil=True)
+def _sum_up(tags, lines, oldest, points, normals, pose, width, reach, out):  # type: ignore[no-untyped-def]
+    """Write the normal equations of a pose into `out`; mean score and mean weighted square."""
+    cos, sin = np.cos(pose[2]), np.sin(pose[2])
+    xx = xy = xt = yy = yt = tt = 0.0
+    bx = by = bt = 0.0
     score = squares = weights = 0.0
-    width, trust = 4.0 * sigma, 1.0
-    px, py, pt = pose[0], pose[1], pose[2]
-    for turn in range(MOST_STEPS):
-        reach = 2 if turn < 4 else 1
-        cos, sin = np.cos(pose[2]), np.sin(pose[2])
-        oxx = oxy = oxt = oyy = oyt = ott = 0.0
-        bx = by = bt = 0.0
-        score = squares = weights = 0.0
-        for p in range(count):
-            rx = cos * points[p, 0] - sin * points[p, 1]
-            ry = sin * points[p, 0] + cos * points[p, 1]
-            nx = cos * normals[p, 0] - sin * normals[p, 1]
-            ny = sin * normals[p, 0] + cos * normals[p, 1]
-            x, y = pose[0] + rx, pose[1] + ry
-            found = _nearest(tags, lines, oldest, x, y, nx, ny, reach)
-            if found < 0:
-                continue
-            line = lines[found // 2, found % 2]
-            dx, dy = x - line[0], y - line[1]
-            if line[2] != 0.0 or line[3] != 0.0:
-                off = line[2] * dx + line[3] * dy
-                w = np.exp(-0.5 * off * off / (width * width))
-                lever = line[3] * rx - line[2] * ry
-                oxx += w * line[2] * line[2]
-                oxy += w * line[2] * line[3]
-                oyy += w * line[3] * line[3]
-                oxt += w * line[2] * lever
-                oyt += w * line[3] * lever
-                ott += w * lever * lever
-                bx -= w * line[2] * off
-                by -= w * line[3] * off
-                bt -= w * lever * off
-                squares += w * off * off
-                weights += w
-                score += np.exp(-0.5 * off * off / 0.0064)
-            else:
-                off2 = dx * dx + dy * dy
-                broad = POINT_SIGMA * width
-                w = np.exp(-0.5 * off2 / (broad * broad)) / (POINT_SIGMA * POINT_SIGMA)
-                oxx += w
-                oyy += w
-                oxt -= w * ry
-                oyt += w * rx
-                ott += w * (rx * rx + ry * ry)
-                bx -= w * dx
-                by -= w * dy
-                bt -= w * (rx * dy - ry * dx)
-                score += np.exp(-0.5 * off2 / 0.0064)
-        info = 1.0 / (sigma * sigma * part)
-        ex, ey = prior[0] - pose[0], prior[1] - pose[1]
-        et = (prior[2] - pose[2] + np.pi) % (2.0 * np.pi) - np.pi
-        gx = held[0, 0] * ex + held[0, 1] * ey + held[0, 2] * et
-        gy = held[0, 1] * ex + held[1, 1] * ey + held[1, 2] * et
-        gt = held[0, 2] * ex + held[1, 2] * ey + held[2, 2] * et
-        trust = 7.0 / (4.0 + ex * gx + ey * gy + et * gt)
-        trust = min(trust, 1.0)
-        a00, a01, a02 = oxx * info, oxy * info, oxt * info
-        a11, a12, a22 = oyy * info, oyt * info, ott * info
-        a00 += trust * held[0, 0]
-        a01 += trust * held[0, 1]
-        a02 += trust * held[0, 2]
-        a11 += trust * held[1, 1]
-        a12 += trust * held[1, 2]
-        a22 += trust * held[2, 2]
-        b0, b1, b2 = bx * info + trust * gx, by * info + trust * gy, bt * info + trust * gt
-        c00, c01, c02 = a11 * a22 - a12 * a12, a12 * a02 - a01 * a22, a01 * a12 - a11 * a02
-        c11, c12, c22 = a00 * a22 - a02 * a02, a01 * a02 - a00 * a12, a00 * a11 - a01 * a01
-        det = a00 * c00 + a01 * c01 + a02 * c02
-        if not det > 0.0:
-            break
-        s0 = (c00 * b0 + c01 * b1 + c02 * b2) / det
-        s1 = (c01 * b0 + c11 * b1 + c12 * b2) / det
-        s2 = (c02 * b0 + c12 * b1 + c22 * b2) / det
-        pose[0] += min(max(s0, -0.2), 0.2)
-        pose[1] += min(max(s1, -0.2), 0.2)
-        pose[2] += min(max(s2, -0.1), 0.1)
-        small = abs(s0) < 2e-4 and abs(s1) < 2e-4 and abs(s2) < 1e-4
-        if width > 1.01 * 2.0 * sigma:
-            width = max(2.0 * sigma, 0.7 * width)
-        elif small and turn >= 4:
-            break
-    out[0, 0], out[0, 1], out[0, 2] = oxx, oxy, oxt
-    out[1, 0], out[1, 1], out[1, 2] = oxy, oyy, oyt
-    out[2, 0], out[2, 1], out[2, 2] = oxt, oyt, ott
-    return score / max(count, 1), squares / max(weights, 1e-9), trust
+    for p in range(points.shape[0]):
+        rx = cos * points[p, 0] - sin * points[p, 1]
+        ry = sin * points[p, 0] + cos * points[p, 1]
+        nx = cos * normals[p, 0] - sin * normals[p, 1]
+        ny = sin * normals[p, 0] + cos * normals[p, 1]
+        x, y = pose[0] + rx, pose[1] + ry
+        found = _nearest(tags, lines, oldest, x, y, nx, ny, reach)
+        if found < 0:
+            continue
+        line = lines[found // 2, found % 2]
+        dx, dy = x - line[0], y - line[1]
+        if line[2] == 0.0 and line[3] == 0.0:
+            score += np.exp(-0.5 * (dx * dx + dy * dy) / (SCORE_M * SCORE_M))
+            continue
+        off = line[2] * dx + line[3] * dy
+        w = np.exp(-0.5 * off * off / (width * width))
+        lever = line[3] * rx - line[2] * ry
+        xx += w * line[2] * line[2]
+        xy += w * line[2] * line[3]
+        yy += w * line[3] * line[3]
+        xt += w * line[2] * lever
+        yt += w * line[3] * lever
+        tt += w * lever * lever
+        bx -= w * line[2] * off
+        by -= w * line[3] * off
+        bt -= w * lever * off
+        squares += w * off * off
+        weights += w
+        score += np.exp(-0.5 * off * off / (SCORE_M * SCORE_M))
+    out[0, 0], out[0, 1], out[0, 2] = xx, xy, xt
+    out[1, 0], out[1, 1], out[1, 2] = xy, yy, yt
+    out[2, 0], out[2, 1], out[2, 2] = xt, yt, tt
+    out[3, 0], out[3, 1], out[3, 2] = bx, by, bt
+    return score / max(points.shape[0], 1), squares / max(weights, 1e-9)
+
+
+@njit(cache=True, nogil=True)
+def _step(sums, variance, prior, held, pose):  # type: ignore[no-untyped-def]
+    """One step of Gauss and Newton; the weight of the prior, and how far it went (m or rad)."""
+    ex, ey = prior[0] - pose[0], prior[1] - pose[1]
+    et = (prior[2] - pose[2] + np.pi) % (2.0 * np.pi) - np.pi
+    gx = held[0, 0] * ex + held[0, 1] * ey + held[0, 2] * et
+    gy = held[0, 1] * ex + held[1, 1] * ey + held[1, 2] * et
+    gt = held[0, 2] * ex + held[1, 2] * ey + held[2, 2] * et
+    trust = min(1.0, 7.0 / (4.0 + ex * gx + ey * gy + et * gt))
+    a00, a01 = (
+        sums[0, 0] / variance + trust * held[0, 0],
+        sums[0, 1] / variance + trust * held[0, 1],
+    )
+    a02, a11 = (
+        sums[0, 2] / variance + trust * held[0, 2],
+        sums[1, 1] / variance + trust * held[1, 1],
+    )
+    a12, a22 = (
+        sums[1, 2] / variance + trust * held[1, 2],
+        sums[2, 2] / variance + trust * held[2, 2],
+    )
+    b0, b1 = sums[3, 0] / variance + trust * gx, sums[3, 1] / variance + trust * gy
+    b2 = sums[3, 2] / variance + trust * gt
+    c00, c01, c02 = a11 * a22 - a12 * a12, a12 * a02 - a01 * a22, a01 * a12 - a11 * a02
+    c11, c12, c22 = a00 * a22 - a02 * a02, a01 * a02 - a00 * a12, a00 * a11 - a01 * a01
+    det = a00 * c00 + a01 * c01 + a02 * c02
+    if not det > 0.0:
+        return trust, 0.0
+    s0 = min(max((c00 * b0 + c01 * b1 + c02 * b2) / det, -MOST_M), MOST_M)
+    s1 = min(max((c01 * b0 + c11 * b1 + c12 * b2) / det, -MOST_M), MOST_M)
+    s2 = min(max((c02 * b0 + c12 * b1 + c22 * b2) / det, -MOST_RAD), MOST_RAD)
+    pose[0] += s0
+    pose[1] += s1
+    pose[2] += s2
+    return trust, max(abs(s0), abs(s1), 2.0 * abs(s2))

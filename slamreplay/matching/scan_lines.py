@@ -23,7 +23,7 @@ NEAREST_M, FARTHEST_M = 0.15, 50.0
 
 
 @njit(cache=True, nogil=True)
-def scan_lines(reach, is_hit, bearing, step, mount, during, points, normals):  # type: ignore[no-untyped-def]  # noqa: C901
+def scan_lines(reach, is_hit, bearing, step, mount, during, points, normals):  # type: ignore[no-untyped-def]
     """Fill in the points of one scan and their normals about the base at its stamp; their number.
 
     Args:

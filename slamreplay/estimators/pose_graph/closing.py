@@ -66,12 +66,14 @@ class Closed:
         belief: (C, 3) where each submap's reference was believed to be once it was done.
         belief_cov: (C, 3, 3) of it, about the parent's axes; empty where not asked for.
         poses: (C, 3) where all are at the end.
+        loosened: (C - 1,) ratios by which covariances of the motions grew.
     """
 
     candidates: tuple[Candidate, ...]
     belief: se2.Array
     belief_cov: se2.Array
     poses: se2.Array
+    loosened: se2.Array
 
     def relations(self) -> Relations:
         """The accepted ones, between submaps."""
@@ -119,6 +121,7 @@ def close_loops(
         np.array(belief),
         np.array(cov) if with_cov else np.empty((0, 3, 3)),
         closer.poses,
+        closer.loosened,
     )
 
 
@@ -131,6 +134,7 @@ class _Closer:
         self.maps, self.graph, self.config, self.match_scale = maps, graph, config, match_scale
         self.poses = graph.poses
         self.candidates: dict[int, Candidate] = {}  # by the new submap
+        self.loosened = np.ones(len(maps) - 1)
         self._waiting: list[int] = []
         self._searcher = Searcher()
         self._last = maps.way[maps.stops[1:] - 1]  # way to the last node of each
@@ -158,9 +162,8 @@ class _Closer:
         if found is None:
             return
         self.candidates[new] = found
-        if found.score < config.min_score or found.nis > config.gate:
-            return
-        self._judge(found, is_sure=sigma < config.sure_m)
+        if found.score >= config.min_score:
+            self._judge(found, is_sure=sigma < config.sure_m and found.nis <= config.gate)
 
     def _away(self, old: NDArray[np.int64], pose: se2.Array) -> se2.Array:
         step = self.poses[old, :2] - pose[:2]
@@ -204,6 +207,7 @@ class _Closer:
         self._waiting = [k for k in self._waiting if k not in agreeing]
         relations = relations_of([self.candidates[k] for k in taken])
         before = self.poses[found.new]
+        self._loosen(found, max(self.candidates[k].nis for k in taken))
         numbers = self.graph.close(relations)
         self.poses = self.graph.poses
         if (relations.chi2(self.poses) > self.config.gate).any():
@@ -215,6 +219,19 @@ class _Closer:
         for k in taken:
             own = moved if k == found.new else np.full(3, np.nan)
             self.candidates[k] = replace(self.candidates[k], accepted=True, moved=own)
+
+    def _loosen(self, found: Candidate, nis: float) -> None:
+        """Trust the motions less that closures speak against, which agree with each other.
+
+        Those since the last closure: what was tied up before has been confirmed. The covariance
+        grows by the variance factor NIS / 3, after which the closures are as expected.
+        """
+        if nis <= self.config.gate:
+            return
+        tied = [c.new for c in self.candidates.values() if c.accepted]
+        since, ratio = max([found.old, *tied]), nis / 3.0
+        self.graph.loosen(since, found.new, ratio)
+        self.loosened[since : found.new] *= ratio
 
     def _agree(self, one: Candidate, two: Candidate) -> bool:
         """Whether two closures say the same of the motion between their submaps.

@@ -19,7 +19,8 @@ class GraphConfig:
             to within it the whole map is searched, m.
         sure_m: where the graph knows a place to this (standard deviation) a closure is taken as it
             is; elsewhere it must be confirmed, m.
-        confirmations: by so many others that it agrees with.
+        confirmations: by so many others that it agrees with. The same lets in what speaks against
+            the motions: they are then trusted less.
         gate: chi-square of 3 degrees of freedom that a closure may be off: 99.9 %.
         phi: chi-square beyond which a closure is switched off gradually.
         trust: share of the curvature of a match's score that counts as information: neighbouring
@@ -42,11 +43,11 @@ class GraphConfig:
     confirmations: int = 2
     gate: float = 16.27
     phi: float = 5.0
-    trust: float = 0.05
-    closure_m: float = 0.03
-    closure_rad: float = 0.008
+    trust: float = 0.5
+    closure_m: float = 0.01
+    closure_rad: float = 0.003
     rounds: int = 3
     pass_m: float = 2.0
     passes: int = 4
     sigma_m: float = 0.02
-    points_per_fact: float = 10.0
+    points_per_fact: float = 2.0

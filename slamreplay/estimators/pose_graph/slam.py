@@ -63,7 +63,7 @@ def slam_of(view: BundleView, config: GraphConfig, estimator: str, *, is_online:
     motion_scale = view.settings.get(PROCESS_NOISE, 1.0)
     match_scale = view.settings.get(MEASUREMENT_NOISE, 1.0)
     config = replace(config, min_score=view.settings.get(MIN_SCORE, config.min_score))
-    start = beginning(view, local, config)
+    start = beginning(view, local, config, match_scale)
     maps = submaps(local, config.submap_m, config.apart_m, motion_scale)
     nodes, at = local.node_xyyaw, int(maps.reference[0])
     way = np.array([0, at])

@@ -27,10 +27,17 @@ GUESS_PART, GUESS_M, GUESS_RAD = 0.5, 0.03, 0.03
 BRIDGED_PART, BRIDGED_M, BRIDGED_RAD = 0.5, 0.02, 0.02
 #: What a scan's pose misses that nothing else shows, at the least, m and rad.
 JITTER_M, JITTER_RAD = 0.001, 0.0005
+#: How fast the steady motion follows. A sweep laid out by the last motion alone would swing up: an
+#: error of it makes one of the next with the other sign, and of about its size.
+STEADY_RATE = 0.25
 #: How fast the typical score and spread follow.
 RATE = 0.02
-#: Bounds of a point's standard deviation about its line, m.
+#: A point's standard deviation about its line is not less than this, m.
 FINEST_M = 0.005
+MOST_STEPS = 20
+
+
+_LIKELY = (fusion.LIKELY_FACTOR, fusion.LIKELY_FACTOR_YAW, fusion.FIRST_SCANS)
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,6 +60,11 @@ class Fit:
     accepted: bool
     moved: se2.Array
 
+    @property
+    def is_matched(self) -> bool:
+        """Whether there was enough to match."""
+        return self.score == self.score
+
 
 @dataclass(eq=False)
 class Follower:
@@ -60,11 +72,19 @@ class Follower:
 
     Attributes:
         config: hyper-parameters.
+        map: lines of the nodes so far, forgotten where they were not seen again.
         pose: (3,) of the last scan.
-        cov: (3, 3) of it against the last node.
-        drift: (3, 3) of what of its error the map takes on: much of a match's error is gone with the
-            next, for a node is laid onto many.
+        cov: (3, 3) of it against the last node, about axes of the local frame.
+        drift: (3, 3) of what of its error the map takes on: much of a match's error is gone with
+            the next, for a node is laid onto many.
         carried: (3, 3) of it, had nothing been matched since.
+        motion: (3,) from the scan before, in the axes of the base there.
+        steady: (3,) of the last scans.
+        learned: (3,) what odometry misses, as in `fusion.predict`.
+        typical: score of the last matches.
+        variance: of a point about its line in them, m^2.
+        lost: how many scans one after another matched nothing.
+        is_refuted: odometry and the last scan told of different motions.
     """
 
     config: MatchConfig
@@ -73,10 +93,12 @@ class Follower:
     drift: se2.Array = field(default_factory=lambda: np.zeros((3, 3)))
     carried: se2.Array = field(default_factory=lambda: np.zeros((3, 3)))
     motion: se2.Array = field(default_factory=lambda: np.zeros(3))
-    learned: se2.Array = field(default_factory=lambda: np.array([1.0, 1.0, fusion.FIRST_SCANS]))
+    steady: se2.Array = field(default_factory=lambda: np.zeros(3))
+    learned: se2.Array = field(default_factory=lambda: np.array(_LIKELY))
     typical: float = 0.85
     variance: float = 0.02**2
     lost: int = 0
+    is_refuted: bool = False
 
     def __post_init__(self) -> None:
         c = self.config
@@ -85,9 +107,8 @@ class Follower:
             c.position_per_metre, c.position_per_turn, c.heading_per_metre, c.heading_per_turn
         ])  # fmt: skip
         self._prior, self._noise, self._told = np.empty(3), np.empty(4), np.empty(30)
-        self._jitter = np.empty((3, 3))
-        self._expected, self._held = np.empty((3, 3)), np.empty((3, 3))
-        self._room, self._sums = np.empty((3, 3, 3)), np.empty((3, 3))
+        self._expected, self._held, self._jitter = (np.empty((3, 3)) for _ in range(3))
+        self._room, self._sums = np.empty((3, 3, 3)), np.empty((4, 3))
         self._field: ScoreField | None = None
 
     def begin(self, points: se2.Array, normals: se2.Array) -> None:
@@ -96,14 +117,18 @@ class Follower:
         self.add_node(points, normals)
         self.lost = 0
 
-    def add_node(self, points: se2.Array, normals: se2.Array) -> se2.Array:
-        """Put the last scan into the map; its covariance (3, 3) against the node before."""
+    def add_node(self, points: se2.Array, normals: se2.Array) -> tuple[se2.Array, se2.Array]:
+        """Put the last scan into the map.
+
+        Returns:
+            Covariances (3, 3) of the map's drift since the node before, and of what the scan
+            misses by itself.
+        """
         self.map.add(self.pose, points, normals)
-        cov = self.drift.copy()
-        self.cov[:] = self.drift[:] = 0.0
-        self.carried[:] = 0.0
+        drift, own = self.drift.copy(), self.cov - self.drift
+        self.cov, self.drift, self.carried = np.zeros((3, 3, 3))
         self._field = None
-        return cov
+        return drift, own
 
     def follow(
         self, step: se2.Array, points: se2.Array, normals: se2.Array, *, is_bridged: bool
@@ -116,106 +141,111 @@ class Follower:
             normals: (P, 2).
             is_bridged: the step is a part of a gap.
         """
-        least = self._least(step, is_bridged=is_bridged)
+        before = self.pose
+        prior = self._predicted(step, is_bridged=is_bridged)
+        if len(points) < LEAST_POINTS:
+            return self._missed(prior, np.nan)
+        pose, score, nis = self._laid(points, normals, prior)
+        if score < self.config.doubted * self.typical or nis > DOUBTED_NIS:
+            pose, score, nis = self._searched(points, normals, before, (pose, score, nis))
+        if score < self.config.poor * self.typical:
+            return self._missed(prior, score)
+        return self._accepted(prior, pose, score, nis)
+
+    def _predicted(self, step: se2.Array, *, is_bridged: bool) -> se2.Array:
+        least = _LEAST
         if step[0] != step[0]:
             step = self.motion
-        before = self.pose.copy()
+            least = GUESS_PART * _size(step) + (GUESS_M, GUESS_RAD)
+        elif is_bridged:
+            least = BRIDGED_PART * _size(step) + (BRIDGED_M, BRIDGED_RAD)
+        before, prior = self.pose, self._prior
         fusion.predict(
             before, self.cov, step, self._per_way, self.learned, least,
-            self._prior, self._noise, self._expected, self._held,
+            prior, self._noise, self._expected, self._held,
         )  # fmt: skip
-        fusion.late(self._prior, step, self.config.late_part, _JITTER, self._jitter)
-        prior = self._prior.copy()
-        fusion.carry_on(
-            self.carried, prior[0] - before[0], prior[1] - before[1], self._noise, self._room
-        )
-        score, nis, pose = 0.0, np.inf, prior.copy()
-        if len(points) >= LEAST_POINTS:
-            score, nis = self._laid(points, normals, pose)
-            if score < self.config.doubted * self.typical or nis > DOUBTED_NIS:
-                score, nis, pose = self._searched(points, normals, before, pose, score, nis)
-        poor = len(points) < LEAST_POINTS or score < self.config.poor * self.typical
-        if poor:
-            return self._missed(prior, score, matched=len(points) >= LEAST_POINTS)
-        told = self._told
-        off = pose - prior
-        off[2] = se2.wrap_angle(off[2])
-        if nis > REFUTED_NIS:  # wheels that slip, a robot that is carried
-            self.carried += np.outer(off, off)
-        fusion.both(self.carried, told[12:21].reshape(3, 3), self.cov, self._room)
-        held = told[21:].reshape(3, 3) / self.config.drift_part
-        fusion.both(self.carried, held, self.drift, self._room)
-        self.typical += RATE * (score - self.typical)
-        self.lost = 0
-        self.pose = pose
-        moved = pose - before
-        c, s = np.cos(before[2]), np.sin(before[2])
-        self.motion = np.array([
-            c * moved[0] + s * moved[1], c * moved[1] - s * moved[0], se2.wrap_angle(moved[2])
-        ])  # fmt: skip
-        return Fit(pose, told[:3].copy(), told[3:12].reshape(3, 3).copy(), score, True, off)
+        fusion.late(prior, step, self.config.late_part, _JITTER, self._jitter)
+        dx, dy = prior[0] - before[0], prior[1] - before[1]
+        fusion.carry_on(self.carried, dx, dy, self._noise, self._room)
+        return prior.copy()
 
-    def _missed(self, prior: se2.Array, score: float, *, matched: bool) -> Fit:
-        self.pose = prior
-        self.cov, self.drift = self.carried.copy(), self.carried.copy()
-        self.motion = np.zeros(3)
-        self.lost += matched
-        told = self._told
-        if not matched:
-            return Fit(prior, np.full(3, np.nan), np.full((3, 3), np.nan), np.nan, False, np.zeros(3))
-        return Fit(
-            prior, told[:3].copy(), told[3:12].reshape(3, 3).copy(), score, False, np.zeros(3)
-        )
-
-    def _least(self, step: se2.Array, *, is_bridged: bool) -> se2.Array:
-        if step[0] != step[0]:
-            way, turn = np.hypot(self.motion[0], self.motion[1]), abs(self.motion[2])
-            return np.array([GUESS_M + GUESS_PART * way, GUESS_RAD + GUESS_PART * turn])
-        if is_bridged:
-            way, turn = np.hypot(step[0], step[1]), abs(step[2])
-            return np.array([BRIDGED_M + BRIDGED_PART * way, BRIDGED_RAD + BRIDGED_PART * turn])
-        return _LEAST
-
-    def _laid(self, points: se2.Array, normals: se2.Array, pose: se2.Array) -> tuple[float, float]:
-        """Score and r' S^-1 r of the scan, its `pose` moved to where it lies best."""
-        c = self.config
-        score, squares, trust = align(
+    def _laid(
+        self, points: se2.Array, normals: se2.Array, start: se2.Array
+    ) -> tuple[se2.Array, float, float]:
+        """Where the scan lies best near `start` (3,), its score, and r' S^-1 r."""
+        c, pose = self.config, start.copy()
+        variance = max(self.variance, FINEST_M**2) * c.points_per_fact
+        score, self._squares, trust = align(
             self.map.tags, self.map.lines, self.map.now - c.memory, points, normals, pose,
-            self._prior, self._held, c.sigma_m, c.points_per_fact, self._sums,
+            self._prior, self._held, c.sigma_m, variance, MOST_STEPS, self._sums,
         )  # fmt: skip
         pose[2] = se2.wrap_angle(pose[2])
-        variance = max(self.variance, FINEST_M**2) * c.points_per_fact
         nis = fusion.fuse(
             self._prior, self._expected, self._held, trust, self._noise, pose, self._sums,
-            variance, self._jitter, self.learned, self._told, self._room,
+            variance, self._jitter, self._told, self._room,
         )  # fmt: skip
-        if score > c.poor * self.typical:
-            self.variance += RATE * (squares - self.variance)
-        return score, nis
+        return pose, score, nis
 
     def _searched(
         self,
         points: se2.Array,
         normals: se2.Array,
         before: se2.Array,
-        pose: se2.Array,
-        score: float,
-        nis: float,
-    ) -> tuple[float, float, se2.Array]:
+        best: tuple[se2.Array, float, float],
+    ) -> tuple[se2.Array, float, float]:
+        """The best of `_laid` from where a wider search finds the scan, if better than `best`."""
         if self._field is None:
             self._field = rescue.search_field(self.map, before)
         if self._field is None:
-            return score, nis, pose
-        learned, told = self.learned.copy(), self._told.copy()
-        best = (score, nis, pose)
+            return best
+        told, squares = self._told.copy(), self._squares
         for place in rescue.places(self._field, points, self._prior, before):
-            trial = place.copy()
-            found, odd = self._laid(points, normals, trial)
-            if found > best[0] + GAIN:
-                best, told = (found, odd, trial), self._told.copy()
-            self.learned = learned.copy()
-        self._told = told
+            found = self._laid(points, normals, place)
+            if found[1] > best[1] + GAIN:
+                best, told, squares = found, self._told.copy(), self._squares
+        self._told, self._squares = told, squares
         return best
+
+    def _accepted(self, prior: se2.Array, pose: se2.Array, score: float, nis: float) -> Fit:
+        told, moved = self._told, _off(pose, prior)
+        self.is_refuted = nis > REFUTED_NIS
+        if self.is_refuted:  # wheels that slip, a robot that is carried
+            self.carried += np.outer(moved, moved)
+        fusion.both(self.carried, told[12:21].reshape(3, 3), self.cov, self._room)
+        held = told[21:].reshape(3, 3) / self.config.drift_part
+        fusion.both(self.carried, held, self.drift, self._room)
+        fusion.learn(self._noise, told, self.learned)
+        self.typical += RATE * (score - self.typical)
+        self.variance += RATE * (self._squares - self.variance)
+        self.lost = 0
+        (x, y, yaw), c, s = _off(pose, self.pose), np.cos(self.pose[2]), np.sin(self.pose[2])
+        self.motion = np.array([c * x + s * y, c * y - s * x, yaw])
+        self.steady += STEADY_RATE * (self.motion - self.steady)
+        self.pose = pose
+        S = told[3:12].reshape(3, 3).copy()
+        return Fit(pose, told[:3].copy(), S, score, accepted=True, moved=moved)
+
+    def _missed(self, prior: se2.Array, score: float) -> Fit:
+        """Go on by odometry alone."""
+        self.pose = prior
+        self.cov, self.drift = self.carried.copy(), self.carried.copy()
+        self.motion, self.steady = np.zeros(3), np.zeros(3)
+        residual, S = np.full(3, np.nan), np.full((3, 3), np.nan)
+        if score == score:
+            self.lost += 1
+            residual, S = self._told[:3].copy(), self._told[3:12].reshape(3, 3).copy()
+        return Fit(prior, residual, S, score, accepted=False, moved=np.zeros(3))
+
+
+def _size(step: se2.Array) -> se2.Array:
+    """(2,) way and turn of a step."""
+    return np.array([np.hypot(step[0], step[1]), abs(step[2])])
+
+
+def _off(pose: se2.Array, other: se2.Array) -> se2.Array:
+    off = pose - other
+    off[2] = se2.wrap_angle(off[2])
+    return off
 
 
 _LEAST = np.array([fusion.LEAST_M, fusion.LEAST_RAD])

@@ -16,7 +16,9 @@ ANYWHERE_M, ANYWHERE_RAD = 1.0, 1.0
 #: So many scans weigh as much as what is assumed of odometry at first, and at the most.
 FIRST_SCANS, MOST_SCANS = 20.0, 300.0
 #: The noise learned stays within these factors of what is assumed, as variances.
-LEAST_FACTOR, MOST_FACTOR = 0.05, 400.0
+LEAST_FACTOR, MOST_FACTOR = 0.01, 400.0
+#: What is assumed is blunt, for what odometry misses is not white: these factors are likely.
+LIKELY_FACTOR, LIKELY_FACTOR_YAW = 0.4, 0.04
 #: Squares of what odometry missed count up to so many times what was expected.
 MOST_SQUARES = 25.0
 
@@ -86,7 +88,7 @@ def _swung(cov, dx, dy, out):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def fuse(prior, expected, held, trust, noise, pose, per_point, variance, jitter, learned, told, room):  # type: ignore[no-untyped-def]
+def fuse(prior, expected, held, trust, noise, pose, per_point, variance, jitter, told, room):  # type: ignore[no-untyped-def]  # noqa: C901
     """What the match said, from where prior and match met.
 
     The top of both, `pose`, has H (match - pose) = trust held (pose - prior): so the match alone
@@ -102,8 +104,6 @@ def fuse(prior, expected, held, trust, noise, pose, per_point, variance, jitter,
         per_point: (3, 3) sum of the points' information at a variance of 1.
         variance: of a point that counts for one.
         jitter: (3, 3) covariance of the pose by what no point shows, a late stamp.
-        learned: (3,) as in `predict`; updated by expectation and maximization: the expected square
-            of what odometry missed given the innovation (Shumway and Stoffer 1982), axis by axis.
         told: (3 + 9 + 9 + 9,) written: innovation, its covariance S, information of the match, and
             that without jitter.
         room: (3, 3, 3) scratch.
@@ -139,24 +139,42 @@ def fuse(prior, expected, held, trust, noise, pose, per_point, variance, jitter,
     for i in range(3):
         for j in range(3):
             S[i, j] = expected[i, j] + R[i, j]
+            if i == j:
+                S[i, j] += noise[3 if i == 2 else 2] - noise[1 if i == 2 else 0]
             told[3 + 3 * i + j] = S[i, j]
     inverse(S, H)
     nis = 0.0
     for i in range(3):
         for j in range(3):
             nis += told[i] * H[i, j] * told[j]
-    if noise[2] > 4.0 * LEAST_M**2:
-        learned[2] = min(learned[2] + 1.0, MOST_SCANS)
-        missed = 0.5 * (
-            _missed(told[0], noise[2], expected[0, 0] - noise[0] + R[0, 0])
-            + _missed(told[1], noise[2], expected[1, 1] - noise[0] + R[1, 1])
-        )
-        missed_yaw = _missed(told[2], noise[3], expected[2, 2] - noise[1] + R[2, 2])
-        learned[0] *= 1.0 + (missed - 1.0) / learned[2]
-        learned[1] *= 1.0 + (missed_yaw - 1.0) / learned[2]
-        for i in range(2):
-            learned[i] = min(max(learned[i], LEAST_FACTOR), MOST_FACTOR)
     return nis
+
+
+@njit(cache=True, nogil=True)
+def learn(noise, told, learned):  # type: ignore[no-untyped-def]
+    """Learn from an innovation what odometry misses, axis by axis.
+
+    By expectation and maximization: the expected square of what was missed, given the innovation
+    (Shumway and Stoffer 1982, An approach to time series smoothing and forecasting using the EM
+    algorithm), averaged over the scans before.
+
+    Args:
+        noise: (4,) variances of the step, as in `predict`.
+        told: of `fuse`.
+        learned: (3,) as in `predict`; updated.
+    """
+    if noise[2] <= 4.0 * LEAST_M**2:
+        return
+    learned[2] = min(learned[2] + 1.0, MOST_SCANS)
+    missed = 0.5 * (
+        _missed(told[0], noise[2], told[3] - noise[2])
+        + _missed(told[1], noise[2], told[7] - noise[2])
+    )
+    missed_yaw = _missed(told[2], noise[3], told[11] - noise[3])
+    learned[0] *= 1.0 + (missed - 1.0) / learned[2]
+    learned[1] *= 1.0 + (missed_yaw - 1.0) / learned[2]
+    for i in range(2):
+        learned[i] = min(max(learned[i], LEAST_FACTOR), MOST_FACTOR)
 
 
 @njit(cache=True, nogil=True)

@@ -48,8 +48,9 @@ def local_trajectory(
     gaps = np.diff(scans.t_ns, prepend=scans.t_ns[:1]) / 1e9
     for k in range(n):
         during = told.during[k]
-        if odometry is None and sweeps[k] > 0.0 and gaps[k] > 0.0:
-            during = min(sweeps[k] / gaps[k], 1.0) * follower.motion
+        is_told = odometry is not None and not follower.is_refuted
+        if not is_told and sweeps[k] > 0.0 and gaps[k] > 0.0:
+            during = min(sweeps[k] / gaps[k], 1.0) * follower.steady
         count = 0
         if usable[k]:
             count = scan_lines(
@@ -57,27 +58,26 @@ def local_trajectory(
                 mount, during, points, normals,
             )  # fmt: skip
         here, there = points[:count], normals[:count]
-        new = False
         if not nodes:
             fits.append(None)
             if count < LEAST_POINTS:
                 continue
+            is_node, broken, own = True, False, np.zeros((3, 3))
             follower.begin(here, there)
-            new = True
-            broken = False
         else:
             fit = follower.follow(told.steps[k], here, there, is_bridged=bool(told.is_bridged[k]))
             fits.append(fit)
-            broken = follower.lost >= config.lost_scans
+            own, broken = follower.cov, follower.lost >= config.lost_scans
+            is_node = broken or (fit.accepted and _moved(follower.pose, xyyaw[nodes[-1]], config))
             if broken:
                 follower.begin(here, there)
                 covs.append(UNKNOWN)
-                new = True
-            elif fit.accepted and _moved(follower.pose, xyyaw[nodes[-1]], config):
-                covs.append(turned(follower.add_node(here, there), -xyyaw[nodes[-1], 2]))
-                new = True
-        xyyaw[k], cov[k] = follower.pose, follower.cov
-        if new:
+                own = np.zeros((3, 3))
+            elif is_node:
+                drift, own = follower.add_node(here, there)
+                covs.append(turned(drift, -xyyaw[nodes[-1], 2]))
+        xyyaw[k], cov[k] = follower.pose, own
+        if is_node:
             nodes.append(k)
             clouds.append(here.copy())
             faces.append(there.copy())

@@ -22,9 +22,8 @@ MOST_POINTS = 100
 
 def search_field(local_map: LineMap, centre: se2.Array) -> ScoreField | None:
     """The score around what the map holds near `centre` (3,), or None where that is nothing."""
-    points = local_map.points()
-    near = (np.abs(points - centre[:2]) < RADIUS_M).all(axis=1)
-    return points_field(points[near], SIGMA_M) if near.any() else None
+    points = local_map.points(centre[:2], RADIUS_M)
+    return points_field(points, SIGMA_M) if len(points) else None
 
 
 def places(

@@ -23,12 +23,14 @@ class LocalTrajectory:
         points: K clouds (M, 2) of the nodes in the base frame at their stamps, deskewed.
         laser_xy: (2,) where the beams start, in the base frame.
         score: (K,) of the nodes; 1 for the first.
-        motion_cov: (K - 1, 3, 3) covariance of the motion from node k to k + 1, about axes of the
-            base at node k, m^2 and rad^2; large where it is a break.
+        motion_cov: (K - 1, 3, 3) covariance of the map's drift from node k to k + 1, about axes of
+            the base at node k, m^2 and rad^2; large where it is a break. These add up over the
+            nodes. What a node misses by itself, and its neighbours do not, is in `cov`.
         is_break: (K,) nothing before was found in its scan: the motion to it is not known.
         normals: K arrays (M, 2), which way the surface at each point faces, in the base frame; 0
             where that is not known.
-        cov: (N, 3, 3) covariance of each pose against the node before it, axes of the local frame.
+        cov: (N, 3, 3) covariance of each pose against the node before it, axes of the local frame;
+            of a node itself, only what its scan misses beside the map's drift.
         fits: N, how each scan came to its pose; None where there was nothing to match to.
     """
 
