@@ -9,6 +9,7 @@ ESTIMATORS = Registry(
         "dead_reckoning": "slamreplay.estimators.dead_reckoning:DeadReckoning",
         "ekf": "slamreplay.estimators.ekf.estimator:Ekf",
         "ekf_tuned": "slamreplay.estimators.ekf.estimator:EkfTuned",
+        "fiducial_grid": "slamreplay.estimators.fiducial_grid.estimator:FiducialGrid",
         "recorded": "slamreplay.estimators.recorded:Recorded",
         "recorded_pose": "slamreplay.estimators.recorded:RecordedPose",
         "recorded_tf": "slamreplay.estimators.recorded:RecordedTf",
