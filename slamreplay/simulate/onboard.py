@@ -1,4 +1,8 @@
-"""The filter, one scan at a time."""
+"""The filter on board: AMCL as the robots of the simulator run it, one scan at a time.
+
+It is not the estimator that replays logs, as a robot's program is not either. Logs in the wild do
+not change when that estimator does: the sample logs hang on every bit of this one.
+"""
 
 from __future__ import annotations
 
@@ -20,15 +24,16 @@ from slamreplay.estimators.start import DEFAULT_COV
 from slamreplay.geometry import se2
 from slamreplay.maps.grid import OccupancyGrid
 from slamreplay.maps.likelihood_field import distance_field
+from slamreplay.simulate import onboard_kernels
 
 
-class AmclFilter:
+class OnboardFilter:
     """A particle filter on a likelihood field, fed with odometry and scans.
 
-    It follows nav2_amcl (differential motion model, `likelihood_field` laser model, KLD sampling,
-    augmented MCL recovery). It differs where this gives the same answer sooner or is told apart by
-    tests: resampling is systematic, not multinomial; headings are one circle for histogram and
-    clusters; recovery compares average likelihoods that do not depend on the particle count.
+    It follows nav2_amcl with the differential motion model and the `likelihood_field` laser model,
+    and honours no parameters of others. Resampling is systematic, not multinomial; headings are one
+    circle for histogram and clusters; recovery compares average likelihoods that do not depend on
+    the particle count.
 
     Args:
         config: nav2_amcl's parameters.
@@ -184,7 +189,8 @@ class AmclFilter:
         ]
         particles = self._particles.copy()
         noise = self._rng.standard_normal(particles.shape)
-        kernels.move(particles, np.array([turn1, distance, turn2]), np.sqrt(variance), noise)
+        motion = np.array([turn1, distance, turn2])
+        onboard_kernels.move(particles, motion, np.sqrt(variance), noise)
         self._adopt(particles, self._weights)
 
     def _weigh(self, beams: Beams) -> None:
@@ -193,7 +199,7 @@ class AmclFilter:
             likelihood = likelihood_table(self._config, self._distance_m, beams.reach_m)
             self._scores = (likelihood**3).astype(np.float32)
             self._scores_range_m = beams.reach_m
-        likelihood = kernels.likelihoods(
+        likelihood = onboard_kernels.likelihoods(
             self._particles,
             beams.ends,
             self._scores,
