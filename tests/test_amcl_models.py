@@ -305,13 +305,13 @@ def test_a_match_finds_the_pose_and_says_how_sure_the_scan_is():
     matcher = ScanMatcher(c, ROOM, distance_field(ROOM, 2.0))
     ends = scan(c).ends
 
-    found = matcher(HERE + np.array([0.15, -0.1, 0.08]), ends)
+    found = matcher(HERE + np.array([[0.15, -0.1, 0.08], [-0.1, 0.1, -0.1]]), [ends, ends])
 
     off = se2.between(HERE, found.xyyaw)
-    assert np.hypot(*off[:2]) < 0.04
-    assert abs(off[2]) < 0.02
-    assert found.score > 0.9
-    assert (np.sqrt(np.diag(found.cov)) < [0.05, 0.05, 0.03]).all()
+    assert (np.hypot(off[:, 0], off[:, 1]) < 0.04).all()
+    assert (np.abs(off[:, 2]) < 0.02).all()
+    assert (found.score > 0.9).all()
+    assert (np.sqrt(np.diagonal(found.cov, axis1=1, axis2=2)) < [0.05, 0.05, 0.03]).all()
     assert np.linalg.eigvalsh(found.cov).min() > 0.0
 
 
@@ -325,23 +325,25 @@ def test_a_corridor_leaves_the_way_along_it_open():
     beams = used_beams(c, BEARINGS, ranges, np.isfinite(ranges), np.zeros(3), 8.0)
 
     found = ScanMatcher(c, corridor, distance_field(corridor, 2.0))(
-        se2.compose(here, np.array([0.3, 0.1, 0.0])), beams.ends
+        se2.compose(here, np.array([[0.3, 0.1, 0.0]])), [beams.ends]
     )
+    cov = found.cov[0, :2, :2]
 
     along = np.array([np.cos(0.6), np.sin(0.6)])
     across = np.array([-along[1], along[0]])
-    assert np.sqrt(along @ found.cov[:2, :2] @ along) > 0.8
-    assert np.sqrt(across @ found.cov[:2, :2] @ across) < 0.05
-    assert abs(se2.between(here, found.xyyaw)[1]) < 0.03
+    assert np.sqrt(along @ cov @ along) > 0.8
+    assert np.sqrt(across @ cov @ across) < 0.05
+    assert abs(se2.between(here, found.xyyaw[0])[1]) < 0.03
 
 
 def test_a_match_without_beams_or_beginning_is_unknown():
     matcher = ScanMatcher(AmclConfig(), ROOM, distance_field(ROOM, 2.0))
 
-    for near, ends in ((HERE, np.empty((2, 0))), (np.full(3, np.nan), np.ones((2, 5)))):
-        found = matcher(near, ends)
-        assert np.isnan(found.xyyaw).all()
-        assert np.isnan(found.score)
+    found = matcher(np.array([HERE, np.full(3, np.nan)]), [np.empty((2, 0)), np.ones((2, 5))])
+
+    assert np.isnan(found.xyyaw).all()
+    assert np.isnan(found.cov).all()
+    assert np.isnan(found.score).all()
 
 
 def test_nothing_is_published_between_resamplings():

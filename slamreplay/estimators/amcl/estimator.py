@@ -113,12 +113,12 @@ class Amcl:
                 if self.judge_scans:
                     returned = beams.returned
                     rank = quantile(amcl.particles, amcl.weights, returned)
-                    ledger.judge(row, rank, matcher(ledger.expected(row), returned.ends), amcl)
+                    ledger.judge(row, rank, returned, amcl)
                 before = amcl.published
                 amcl.correct(beams)
                 ledger.update(row, amcl, is_published=amcl.published is not before or here == at)
                 here += 1
-        return ledger.estimate(rows, view.manifest.frames.base or "base_link")
+        return ledger.estimate(rows, view.manifest.frames.base or "base_link", matcher)
 
     def _perturbed(self, view: BundleView, seed: int) -> tuple[AmclConfig, tuple[int, ...]]:
         """The configuration and the words of the seed, as a perturbation changes them."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -37,6 +38,8 @@ class Beams:
     def returned(self) -> Beams:
         """Those that came back; all but for the beam model."""
         some = self.ranges_m < self.reach_m
+        if some.all():
+            return self
         return replace(self, bearings=self.bearings[some], ranges_m=self.ranges_m[some])
 
     def thinned(self, most: int) -> Beams:
@@ -44,7 +47,7 @@ class Beams:
         some = slice(0, None, max(1, -(-len(self) // most)))
         return replace(self, bearings=self.bearings[some], ranges_m=self.ranges_m[some])
 
-    @property
+    @cached_property
     def ends(self) -> se2.Array:
         """(2, M) where they end, in the base frame, m."""
         return self.ends_at(self.ranges_m)

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from slamreplay.bundle.run import Estimate, Innovations
 from slamreplay.bundle.track import PoseTrack
 from slamreplay.estimators.amcl.filter import AmclFilter
-from slamreplay.estimators.amcl.match import Match
+from slamreplay.estimators.amcl.laser import Beams
+from slamreplay.estimators.amcl.match import ScanMatcher
 from slamreplay.geometry import se2
 
 #: What the scans' innovations are of, and its units.
@@ -21,10 +22,10 @@ _UNKNOWN = np.full(3, np.nan)
 @dataclass(frozen=True, eq=False)
 class _Judged:
     row: int
-    residual: se2.Array
-    S: se2.Array
-    score: float
+    rank: float
     before: se2.Array
+    cov: se2.Array
+    ends: se2.Array
 
 
 class Ledger:
@@ -40,7 +41,6 @@ class Ledger:
         self._t_ns, self._T_odom_base, self._frame_id = t_ns, T_odom_base, frame_id
         self._T_map_odom = _UNKNOWN
         self._events: list[tuple[int, se2.Array, se2.Array, float, float, float]] = []
-        self._ranks: list[tuple[int, float]] = []
         self._judged: list[_Judged] = []
 
     def begin(self, row: int, xyyaw: se2.Array | None) -> None:
@@ -50,18 +50,10 @@ class Ledger:
         else:
             self._T_map_odom = se2.compose(xyyaw, se2.inverse(self._T_odom_base[row]))
 
-    def expected(self, row: int) -> se2.Array:
-        """(3,) the belief that odometry carried to a row."""
-        return se2.compose(self._T_map_odom, self._T_odom_base[row])
-
-    def judge(self, row: int, rank: float, match: Match, amcl: AmclFilter) -> None:
+    def judge(self, row: int, rank: float, beams: Beams, amcl: AmclFilter) -> None:
         """A scan that is about to be taken in, by a filter that was moved to it."""
-        self._ranks.append((row, rank))
-        before = self.expected(row)
-        residual = match.xyyaw - before
-        residual[2] = se2.wrap_angle(residual[2])
-        S = amcl.cov + match.cov
-        self._judged.append(_Judged(row, residual, S, match.score, before))
+        before = se2.compose(self._T_map_odom, self._T_odom_base[row])
+        self._judged.append(_Judged(row, rank, before, amcl.cov, beams.ends))
 
     def update(self, row: int, amcl: AmclFilter, *, is_published: bool) -> None:
         """A scan was taken in; the belief is that of before where nothing was published."""
@@ -72,8 +64,13 @@ class Ledger:
         numbers = float(len(amcl.weights)), amcl.ess, float(said.clusters)
         self._events.append((row, self._T_map_odom, said.cov, *numbers))
 
-    def estimate(self, rows: NDArray[np.int64], child_frame_id: str) -> Estimate:
-        """The run, at those rows that have odometry and come after the start."""
+    def estimate(
+        self, rows: NDArray[np.int64], child_frame_id: str, matcher: ScanMatcher
+    ) -> Estimate:
+        """The run, at those rows that have odometry and come after the start.
+
+        Scans are matched here, all at once: what the filter does hangs on none of that.
+        """
         n = len(self._t_ns)
         xyyaw, cov = np.full((n, 3), np.nan), np.full((n, 3, 3), np.nan)
         names = ("updated", "particles", "ess", "clusters", "likelihood_quantile")
@@ -88,27 +85,29 @@ class Ledger:
                 columns[name][rows] = column[latest]
             columns["updated"][rows] = 0.0
             columns["updated"][at] = 1.0
-        for row, rank in self._ranks:
-            columns["likelihood_quantile"][row] = rank
+        for one in self._judged:
+            columns["likelihood_quantile"][one.row] = one.rank
         track = PoseTrack(self._frame_id, child_frame_id, self._t_ns, xyyaw, cov)
-        return Estimate(track, self._innovations(xyyaw), columns)
+        return Estimate(track, self._innovations(xyyaw, matcher), columns)
 
-    def _innovations(self, xyyaw: se2.Array) -> tuple[Innovations, ...]:
+    def _innovations(self, xyyaw: se2.Array, matcher: ScanMatcher) -> tuple[Innovations, ...]:
         if not self._judged:
             return ()
         at = np.array([j.row for j in self._judged])
-        moved = xyyaw[at] - np.array([j.before for j in self._judged])
-        moved[:, 2] = se2.wrap_angle(moved[:, 2])
+        before = np.array([j.before for j in self._judged])
+        found = matcher(before, [j.ends for j in self._judged])
+        residual, moved = found.xyyaw - before, xyyaw[at] - before
+        residual[:, 2], moved[:, 2] = se2.wrap_angle(residual[:, 2]), se2.wrap_angle(moved[:, 2])
         scan = Innovations(
             "scan",
             self._t_ns[at],
-            np.array([j.residual for j in self._judged]),
-            np.array([j.S for j in self._judged]),
+            residual,
+            np.array([j.cov for j in self._judged]) + found.cov,
             np.ones(len(at), dtype=bool),
             AXES,
             self._frame_id,
             moved,
-            score=np.array([j.score for j in self._judged]),
+            score=found.score,
             is_predicted=False,
         )
         return (scan,)

@@ -1,7 +1,8 @@
-"""Where a scan alone fits best near a pose, and how well it says so."""
+"""Where scans alone fit best near a pose, and how well they say so."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,25 +16,27 @@ from slamreplay.maps.grid import OccupancyGrid
 #: Steps of the climb at most, and when it is over, in cells and rad: far below any map's truth.
 _STEPS, _SMALL_CELLS, _SMALL_RAD = 15, 0.01, 1e-4
 #: A scan that leaves a direction open (a corridor) says this much of it: 1 m, 0.5 rad.
-_OPEN = np.array([1.0, 1.0, 0.5])
-#: Where `climb` puts the elements of the information matrix.
+_NEARLY_NOTHING = np.diag([1.0, 1.0, 1.0 / 0.5**2])
+#: Least mean square distance, in square cells: a cell has that by itself.
+_LEAST = 1.0 / 12.0
+#: Where a climb puts the elements of the information matrix.
 _FULL = 5 + np.array([[0, 1, 2], [1, 3, 4], [2, 4, 5]])
 
 
 @dataclass(frozen=True, eq=False)
-class Match:
-    """A scan against the map.
+class Matches:
+    """S scans against the map.
 
     Attributes:
-        xyyaw: (3,) base in the map where it fits best; NaN without beams or a place to begin at.
-        cov: (3, 3) of that, in the map's axes; an open direction has 1 m or 0.5 rad.
-        score: mean over beams of exp(-d^2 / (2 sigma_hit^2)), d the distance of its end to a wall:
-            1 where all end on walls, about 0 where none does.
+        xyyaw: (S, 3) base in the map where each fits best; NaN without beams or a place to begin.
+        cov: (S, 3, 3) of that, in the map's axes; an open direction has 1 m or 0.5 rad.
+        score: (S,) mean over beams of exp(-d^2 / (2 sigma_hit^2)), d the distance of its end to a
+            wall: 1 where all end on walls, about 0 where none does.
     """
 
     xyyaw: se2.Array
     cov: se2.Array
-    score: float
+    score: se2.Array
 
 
 class ScanMatcher:
@@ -52,34 +55,31 @@ class ScanMatcher:
     def __init__(
         self, config: AmclConfig, grid: OccupancyGrid, distance_m: NDArray[np.float32]
     ) -> None:
-        self._grid = grid
+        origin = np.asarray(grid.origin_xyyaw, dtype=np.float64)
+        self._frame = np.array([*origin, grid.resolution_m])
+        self._turn = _turn(origin[2])
+        per = np.array([grid.resolution_m, grid.resolution_m, 1.0])
+        self._unit = np.outer(per, per)
         self._sigma = config.sigma_hit / grid.resolution_m
         cut = config.laser_likelihood_max_dist
         self._cells = (np.pad(distance_m, 2, constant_values=cut) / grid.resolution_m).astype(
             np.float32
         )
 
-    def __call__(self, near_xyyaw: se2.Array, ends: se2.Array) -> Match:
-        """The best fit near a pose (3,) in the map, of beams that end at (2, M), base frame, m."""
-        if not ends.shape[1] or not np.isfinite(near_xyyaw).all():
-            return Match(np.full(3, np.nan), np.full((3, 3), np.nan), float("nan"))
-        size = self._grid.resolution_m
-        origin = np.asarray(self._grid.origin_xyyaw, dtype=np.float64)
-        start = se2.between(origin, near_xyyaw)
-        out = np.empty(14)
-        climb(
-            self._cells,
-            np.array([start[0] / size, start[1] / size, start[2]]),
-            ends / size,
-            self._sigma,
-            out,
-        )
-        best = se2.compose(origin, np.array([out[0] * size, out[1] * size, out[2]]))
-        per = np.array([size, size, 1.0])
-        information = out[_FULL] / np.outer(per, per) / max(out[4], 1.0 / 12.0)
-        L = np.linalg.cholesky(information + np.diag(1.0 / _OPEN**2))
-        turned = np.linalg.solve(L, _turn(origin[2]))
-        return Match(best, turned.T @ turned, float(out[3]))
+    def __call__(self, near_xyyaw: se2.Array, ends: Sequence[se2.Array]) -> Matches:
+        """Best fits near poses (S, 3) in the map, of scans whose beams end at (2, M), base, m."""
+        n = len(ends)
+        first = np.cumsum([0, *(e.shape[1] for e in ends)])
+        out = np.full((n, 14), np.nan)
+        everything = np.concatenate([np.empty((2, 0)), *ends], axis=1)
+        climb_all(self._cells, self._frame, near_xyyaw, everything, first, self._sigma, out)
+        information = out[:, _FULL] / (self._unit * np.maximum(out[:, 4], _LEAST)[:, None, None])
+        known = np.isfinite(out).all(axis=1)
+        L = np.linalg.cholesky(information[known] + _NEARLY_NOTHING)
+        turned = np.linalg.solve(L, np.broadcast_to(self._turn, L.shape))
+        cov = np.full((n, 3, 3), np.nan)
+        cov[known] = np.swapaxes(turned, 1, 2) @ turned
+        return Matches(out[:, :3], cov, out[:, 3])
 
 
 def _turn(yaw: float) -> se2.Array:
@@ -89,19 +89,31 @@ def _turn(yaw: float) -> se2.Array:
 
 
 @njit(cache=True, error_model="numpy")
-def climb(distance, start, ends, sigma, out):  # type: ignore[no-untyped-def]
-    """Fill (14,): best pose, its score, mean square distance, and what `_linear` gives there.
+def climb_all(distance, frame, near, ends, first, sigma, out):  # type: ignore[no-untyped-def]
+    """Fill (S, 14): best pose, its score, mean square distance, and what `_linear` gives there.
 
-    All in cells and rad. Args: distance (H + 4, W + 4) float32 with a border of two cells, start
-    (3,) in the grid's frame, ends (2, M) in the base frame.
+    Args: distance (H + 4, W + 4) float32 with a border of two cells, in cells; frame (4,): the
+    grid's pose in the map and its resolution in m; near (S, 3) in the map, m; ends (2, sum of M) in
+    the base frame, m, those of a scan from `first` (S + 1,) on; sigma in cells. A scan without
+    beams, or with a pose that is not finite, is left as it is.
     """
+    for k in range(len(out)):
+        if first[k] < first[k + 1] and np.isfinite(near[k, 0] + near[k, 1] + near[k, 2]):
+            _climb(distance, frame, near[k], ends[:, first[k] : first[k + 1]], sigma, out[k])
+
+
+@njit(cache=True, error_model="numpy")
+def _climb(distance, frame, near, ends, sigma, out):  # type: ignore[no-untyped-def]
     here, there = np.empty(9), np.empty(9)
-    x, y, yaw = start[0], start[1], start[2]
-    score, square = _linear(distance, x, y, yaw, ends, sigma, here)
+    cos, sin, size = np.cos(frame[2]), np.sin(frame[2]), frame[3]
+    dx, dy = near[0] - frame[0], near[1] - frame[1]
+    x, y = (cos * dx + sin * dy) / size, (cos * dy - sin * dx) / size
+    yaw = near[2] - frame[2]
+    score, square = _linear(distance, size, x, y, yaw, ends, sigma, here)
     damping = 1e-3
     for _ in range(_STEPS):
         dx, dy, dyaw = _step(here, damping)
-        higher, around = _linear(distance, x - dx, y - dy, yaw - dyaw, ends, sigma, there)
+        higher, around = _linear(distance, size, x - dx, y - dy, yaw - dyaw, ends, sigma, there)
         if higher > score:
             x, y, yaw, score, square = x - dx, y - dy, yaw - dyaw, higher, around
             here, there = there, here
@@ -110,19 +122,22 @@ def climb(distance, start, ends, sigma, out):  # type: ignore[no-untyped-def]
             damping *= 10.0
         if max(abs(dx), abs(dy)) < _SMALL_CELLS and abs(dyaw) < _SMALL_RAD:
             break
-    out[0], out[1], out[2], out[3], out[4] = x, y, yaw, score, square
+    out[0] = frame[0] + (cos * x - sin * y) * size
+    out[1] = frame[1] + (sin * x + cos * y) * size
+    out[2] = (yaw + frame[2] + np.pi) % (2.0 * np.pi) - np.pi
+    out[3], out[4] = score, square
     for k in range(9):
         out[5 + k] = here[k]
 
 
 @njit(cache=True, error_model="numpy")
-def _linear(distance, x0, y0, yaw, ends, sigma, out):  # type: ignore[no-untyped-def]
-    """Score and weighted mean square distance at a pose.
+def _linear(distance, size, x0, y0, yaw, ends, sigma, out):  # type: ignore[no-untyped-def]
+    """Score and weighted mean square distance at a pose, all in cells and rad but the ends.
 
     Fills (9,): the normal equations there, upper triangle by rows and right side.
     """
     height, width = distance.shape
-    cos, sin = np.cos(yaw), np.sin(yaw)
+    cos, sin = np.cos(yaw) / size, np.sin(yaw) / size
     total, square = 0.0, 0.0
     xx, xy, xt, yy, yt, tt, gx, gy, gt = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for j in range(ends.shape[1]):
