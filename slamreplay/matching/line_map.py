@@ -190,18 +190,17 @@ def align(tags, lines, oldest, points, normals, pose, prior, held, sigma, varian
         Mean score of the points, mean weighted square of their distances (m^2), and how far the
         prior was trusted: Student's weight for 4 degrees of freedom, 1 where it fits.
     """
-    width, trust, moved = 4.0 * sigma, 1.0, np.inf
-    score, squares = _sum_up(tags, lines, oldest, points, normals, pose, width, 2, out)
-    for turn in range(steps):
+    width, trust, is_done, turn = 4.0 * sigma, 1.0, False, 0
+    while True:
+        # One call, for each would be compiled by itself.
+        reach = 2 if turn <= WIDE_STEPS else 1
+        score, squares = _sum_up(tags, lines, oldest, points, normals, pose, width, reach, out)
+        if is_done or turn == steps:
+            return score, squares, trust
         trust, moved = _step(out, variance, prior, held, pose)
         narrow = max(2.0 * sigma, 0.7 * width)
-        reach = 2 if turn < WIDE_STEPS else 1
         is_done = moved < SMALL and narrow == width and turn >= WIDE_STEPS
-        width = narrow
-        score, squares = _sum_up(tags, lines, oldest, points, normals, pose, width, reach, out)
-        if is_done:
-            break
-    return score, squares, trust
+        width, turn = narrow, turn + 1
 
 
 @njit(cache=True, nogil=True)
