@@ -18,6 +18,7 @@ from slamreplay.estimators.ekf.consensus import locate, window_of
 from slamreplay.estimators.ekf.filter import filtered, gates_of
 from slamreplay.estimators.ekf.motion import Motion
 from slamreplay.estimators.ekf.noise import Noise
+from slamreplay.estimators.ekf.observations import cartesian
 from slamreplay.estimators.start import Start
 from slamreplay.geometry import se2
 
@@ -216,17 +217,23 @@ def test_it_starts_from_sightings_alone_though_some_names_are_wrong():
     assert within >= 19
 
 
+def of_polar(polar, dims, R, *more):
+    """A window of ranges, bearings and headings."""
+    seen, cov = cartesian(polar, R)
+    return window_of(seen, dims, cov, *more)
+
+
 def test_one_thing_alone_tells_no_pose():
     evidence, truth = world(2, seconds=10.0)
     seen = evidence.observations
     rows = np.arange(4)
     one = seen.thing[rows] == seen.thing[rows][0]
     R, still = seen.covariance(Noise())[rows], np.zeros((4, 3))
-    whole = window_of(seen.polar[rows], seen.dims[rows], R, PLACES[seen.thing[rows]],
-                      seen.thing[rows], still, np.zeros((4, 3, 3)))  # fmt: skip
-    alone = window_of(seen.polar[:1].repeat(4, 0), seen.dims[rows], R,
-                      PLACES[seen.thing[:1].repeat(4)], seen.thing[:1].repeat(4), still,
-                      np.zeros((4, 3, 3)))  # fmt: skip
+    whole = of_polar(seen.sensed[rows], seen.dims[rows], R, PLACES[seen.thing[rows]],
+                     seen.thing[rows], still, np.zeros((4, 3, 3)))  # fmt: skip
+    alone = of_polar(seen.sensed[:1].repeat(4, 0), seen.dims[rows], R,
+                     PLACES[seen.thing[:1].repeat(4)], seen.thing[:1].repeat(4), still,
+                     np.zeros((4, 3, 3)))  # fmt: skip
 
     pose, cov = locate(whole)
     assert one.sum() < 4
@@ -245,7 +252,7 @@ def test_a_window_is_brought_to_the_last_base_with_the_noise_of_the_way():
     dims = np.full(3, 3)
 
     def points(p, s):
-        w = window_of(p, dims, np.stack([R] * 3), np.zeros((3, 3)), np.arange(3), s, Q)
+        w = of_polar(p, dims, np.stack([R] * 3), np.zeros((3, 3)), np.arange(3), s, Q)
         return np.column_stack([w.points, w.headings]), w.cov
 
     mean, cov = points(polar, steps)
@@ -292,7 +299,7 @@ def test_no_pose_is_taken_where_another_one_explains_as_many_sightings():
 
     def found(rows):
         dims = np.full(len(rows), 2)
-        return locate(window_of(polar[rows], dims, R[rows], at[rows], rows, still[rows], Q[rows]))
+        return locate(of_polar(polar[rows], dims, R[rows], at[rows], rows, still[rows], Q[rows]))
 
     np.testing.assert_allclose(found(np.array([0, 1, 2]))[0], X, atol=1e-6)
     np.testing.assert_allclose(found(np.array([2, 3, 4]))[0], Y, atol=1e-6)

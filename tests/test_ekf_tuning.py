@@ -96,10 +96,10 @@ def test_a_late_odometry_is_found():
 def test_a_depth_that_is_called_a_range_is_found():
     evidence, _ = world(8, replace(Noise(), range_per_m=0.01, range_m=0.01), seconds=120.0)
     seen = evidence.observations
-    ahead = np.abs(seen.polar[:, 1]) < 0.6  # a camera sees no farther aside
-    polar = seen.polar.copy()
+    ahead = np.abs(seen.sensed[:, 1]) < 0.6  # a camera sees no farther aside
+    polar = seen.sensed.copy()
     polar[:, 0] *= np.cos(polar[:, 1] - 0.05)
-    found = tuned(replace(evidence, observations=replace(seen, polar=polar).take(ahead)), GATES)
+    found = tuned(replace(evidence, observations=replace(seen, sensed=polar).take(ahead)), GATES)
 
     assert found.noise.range_falloff == pytest.approx(0.48, abs=0.05)
     assert found.noise.range_axis_rad == pytest.approx(0.05, abs=0.03)
@@ -120,7 +120,7 @@ def test_rejecting_everything_is_no_way_out():
     sure = replace(Noise(), range_m=1e-4, range_per_m=1e-4, bearing_rad=1e-4)
     rejecting = filtered(LOG, sure, GATES, 1e-6)
     fair = filtered(LOG, Noise(), GATES)
-    price = np.log(OUTLIERS) - np.log(seen.polar[:, 0].max()) - np.log(2.0 * np.pi)
+    price = np.log(OUTLIERS) - np.log(seen.sensed[:, 0].max()) - np.log(2.0 * np.pi)
 
     rejected = rejecting.status == kernels.REJECTED
     assert rejected.mean() > 0.8

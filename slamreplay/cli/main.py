@@ -14,6 +14,7 @@ from typing import Annotated, Any
 import typer
 
 from slamreplay import __version__
+from slamreplay.cli.kernel_cache import keep_kernels
 from slamreplay.errors import SlamreplayError
 
 #: Exit codes of design: 1 is raised by the commands that were asked to judge (`--fail-on`).
@@ -62,6 +63,7 @@ def main() -> None:
 def run() -> int:
     """The exit code of the command in `sys.argv`."""
     debug = "--debug" in sys.argv
+    keep_kernels(cache_folder())
     try:
         for name in COMMANDS:
             import_module(f"slamreplay.cli.{name}").register(app)
@@ -108,9 +110,12 @@ def _crash_file() -> Path:
 
 
 def cache_folder() -> Path:
-    """`$XDG_CACHE_HOME/slamreplay`, by default under ~/.cache."""
+    """`$XDG_CACHE_HOME/slamreplay`, by default under ~/.cache; without a home temporary."""
     named = os.environ.get("XDG_CACHE_HOME")
-    return (Path(named) if named else Path.home() / ".cache") / "slamreplay"
+    try:
+        return (Path(named) if named else Path.home() / ".cache") / "slamreplay"
+    except RuntimeError:
+        return Path(tempfile.gettempdir()) / "slamreplay"
 
 
 if __name__ == "__main__":

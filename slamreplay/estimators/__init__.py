@@ -11,6 +11,7 @@ ESTIMATORS = Registry(
         "ekf_tuned": "slamreplay.estimators.ekf.estimator:EkfTuned",
         "pose_graph": "slamreplay.estimators.pose_graph.estimator:PoseGraph",
         "pose_graph_online": "slamreplay.estimators.pose_graph.estimator:PoseGraphOnline",
+        "fiducial_grid": "slamreplay.estimators.fiducial_grid.estimator:FiducialGrid",
         "recorded": "slamreplay.estimators.recorded:Recorded",
         "recorded_pose": "slamreplay.estimators.recorded:RecordedPose",
         "recorded_tf": "slamreplay.estimators.recorded:RecordedTf",

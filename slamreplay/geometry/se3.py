@@ -69,8 +69,25 @@ def inverse(T_a_b: ArrayLike) -> Array:
 def rotation_vector(R: ArrayLike) -> Array:
     """Axis times angle in rad, angle 0 to pi, of rotation matrices (..., 3, 3): their logarithm.
 
-    By way of the quaternion with the largest of its four components in the denominator, which is
-    good at every angle; by the skew part alone half turns would have no axis. NaN stays NaN.
+    By way of the quaternion; by the skew part alone half turns would have no axis. NaN stays NaN.
+    """
+    q = _scaled_quaternion(R)
+    length = np.linalg.norm(q[..., :3], axis=-1, keepdims=True)
+    angle = 2.0 * np.arctan2(length, q[..., 3:])
+    # Without a turn there is no axis, and the vector is as good as twice the quaternion's.
+    return np.asarray(q[..., :3] * angle / np.where(length > 0.0, length, 1.0))
+
+
+def quaternion(R: ArrayLike) -> Array:
+    """Unit quaternions (..., 4) xyzw of rotation matrices (..., 3, 3), w not negative."""
+    q = _scaled_quaternion(R)
+    return np.asarray(q / np.linalg.norm(q, axis=-1, keepdims=True))
+
+
+def _scaled_quaternion(R: ArrayLike) -> Array:
+    """Quaternions (..., 4) xyzw of any length, w not negative.
+
+    With the largest of the four components in the denominator, which is good at every angle.
     """
     R = np.asarray(R, dtype=np.float64)
     trace = R[..., 0, 0] + R[..., 1, 1] + R[..., 2, 2]
@@ -83,11 +100,7 @@ def rotation_vector(R: ArrayLike) -> Array:
     scaled[..., 3, 3] = 1.0 + trace
     largest = np.argmax(np.diagonal(scaled, axis1=-2, axis2=-1), axis=-1)
     q = np.take_along_axis(scaled, largest[..., None, None], axis=-2)[..., 0, :]
-    q = q * np.where(q[..., 3:] < 0.0, -1.0, 1.0)
-    length = np.linalg.norm(q[..., :3], axis=-1, keepdims=True)
-    angle = 2.0 * np.arctan2(length, q[..., 3:])
-    # Without a turn there is no axis, and the vector is as good as twice the quaternion's.
-    return np.asarray(q[..., :3] * angle / np.where(length > 0.0, length, 1.0))
+    return np.asarray(q * np.where(q[..., 3:] < 0.0, -1.0, 1.0))
 
 
 def rotation_from_vector(vector: ArrayLike) -> Array:

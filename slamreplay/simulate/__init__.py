@@ -11,4 +11,5 @@ SCENARIOS = {
     "changed_aisle": "Pallets stand in the way and a rack is gone; the robot knows where it is.",
     "lost_in_changed_aisle": "A wrong start pose in a warehouse that has changed as well.",
     "corridor_100m": "One round of 100 m through the corridors of an office, back to the start.",
+    "barcode_floor": "A drive unit on codes in the floor: some worn, some misread, none for 15 s.",
 }

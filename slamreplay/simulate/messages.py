@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from slamreplay.geometry import se2
+from slamreplay.geometry import se2, se3
 from slamreplay.geometry.covariance import ros_from_planar
 from slamreplay.geometry.times import NS_PER_S
 
@@ -114,6 +115,50 @@ class Messages:
             transform=motion,
         )
         return self.make("tf2_msgs/TFMessage", transforms=[stamped])
+
+    def spatial_transforms(
+        self, t_ns: int, parent: str, children: Sequence[str], T: se2.Array
+    ) -> Any:
+        """tf2_msgs/TFMessage with the poses T (N, 4, 4) of N frames in their parent."""
+        found = [
+            self.make(
+                "geometry_msgs/TransformStamped",
+                header=self.header(t_ns, parent),
+                child_frame_id=child,
+                transform=self.make(
+                    "geometry_msgs/Transform",
+                    translation=self.vector(*pose[:3, 3]),
+                    rotation=self.rotation(pose),
+                ),
+            )
+            for child, pose in zip(children, T, strict=True)
+        ]
+        return self.make("tf2_msgs/TFMessage", transforms=found)
+
+    def rotation(self, T: se2.Array) -> Any:
+        """geometry_msgs/Quaternion of a pose (4, 4)."""
+        x, y, z, w = (float(v) for v in se3.quaternion(T[:3, :3]))
+        return self.make("geometry_msgs/Quaternion", x=x, y=y, z=z, w=w)
+
+    def code(self, t_ns: int, camera: str, number: int, size_m: float, T: se2.Array) -> Any:
+        """apriltag_ros/AprilTagDetection of a pose (4, 4) in the camera; no covariance is told."""
+        x, y, z = (float(v) for v in T[:3, 3])
+        pose = self.make(
+            "geometry_msgs/Pose",
+            position=self.make("geometry_msgs/Point", x=x, y=y, z=z),
+            orientation=self.rotation(T),
+        )
+        stamped = self.make(
+            "geometry_msgs/PoseWithCovarianceStamped",
+            header=self.header(t_ns, camera),
+            pose=self.make("geometry_msgs/PoseWithCovariance", pose=pose, covariance=np.zeros(36)),
+        )
+        return self.make(
+            "apriltag_ros/AprilTagDetection",
+            id=np.array([number], dtype=np.int32),
+            size=np.array([size_m]),
+            pose=stamped,
+        )
 
     def grid(
         self,

@@ -9,6 +9,7 @@ import numpy as np
 from slamreplay.geometry import se2
 from slamreplay.maps.grid import OccupancyGrid
 from slamreplay.simulate import sensors
+from slamreplay.simulate.codes import Readings, read_codes
 from slamreplay.simulate.drive import Motion, drive
 from slamreplay.simulate.localizer import Beliefs, localize
 from slamreplay.simulate.scenarios import CLICKED_COV, Scenario
@@ -35,6 +36,7 @@ class Recording:
         gyro: (N, 3) turn rates, one row per sample of the motion.
         force: (N, 3) specific forces.
         beliefs: the localizer, one row per scan.
+        readings: codes in the floor, None where there are none.
         start: (3,) the pose it was given.
         seed: of every random number.
     """
@@ -50,6 +52,7 @@ class Recording:
     gyro: se2.Array
     force: se2.Array
     beliefs: Beliefs
+    readings: Readings | None
     start: se2.Array
     seed: int
 
@@ -58,14 +61,17 @@ def record(scenario: Scenario, seed: int | None = None) -> Recording:
     """Play a scenario; `seed` takes the place of its own."""
     seed = scenario.seed if seed is None else seed
     # One stream per sensor, so that another lidar does not change the wheels.
-    streams = np.random.SeedSequence(seed).spawn(5)
+    streams = np.random.SeedSequence(seed).spawn(6)
     lidar_rng, wheel_rng, imu_rng, start_rng = (
         np.random.Generator(np.random.PCG64(s)) for s in streams[:4]
     )
     grid = rasterise(scenario.mapped, scenario.map_resolution_m, as_map=True)
     standing = rasterise(scenario.standing, scenario.true_resolution_m, as_map=False)
     motion = drive(scenario.start, scenario.tour)
-    scans = sensors.scan(scenario.lidar, standing, scenario.walkers, motion, lidar_rng)
+    if "laser" in scenario.without:
+        scans = sensors.Scans(np.empty(0), np.empty((0, scenario.lidar.beams), dtype=np.float32))
+    else:
+        scans = sensors.scan(scenario.lidar, standing, scenario.walkers, motion, lidar_rng)
     scans = _seen(scans, scenario)
     rear = None
     if scenario.rear is not None:
@@ -97,6 +103,10 @@ def record(scenario: Scenario, seed: int | None = None) -> Recording:
         filter_seed,
         scenario.amcl,
     )
+    readings = None
+    if scenario.floor is not None:
+        code_rng = np.random.Generator(np.random.PCG64(streams[5]))
+        readings = read_codes(scenario.floor, motion, code_rng)
     return Recording(
         scenario,
         grid,
@@ -109,6 +119,7 @@ def record(scenario: Scenario, seed: int | None = None) -> Recording:
         gyro,
         force,
         beliefs,
+        readings,
         clicked,
         seed,
     )

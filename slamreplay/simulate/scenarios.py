@@ -10,6 +10,7 @@ from slamreplay.errors import UsageError
 from slamreplay.estimators.amcl.config import AmclConfig
 from slamreplay.geometry import se2
 from slamreplay.simulate import SCENARIOS
+from slamreplay.simulate.codes import CodeFloor
 from slamreplay.simulate.drive import BackUp, Carry, Follow, Pause, Slip, Spin, Step
 from slamreplay.simulate.people import Walker
 from slamreplay.simulate.sensors import Lidar, WheelErrors
@@ -18,6 +19,7 @@ from slamreplay.simulate.worlds import (
     TRUE_RESOLUTION_M,
     World,
     box,
+    drive_hall,
     office,
     warehouse,
 )
@@ -45,7 +47,9 @@ class Scenario:
         scan_late_s: stamps of scans are late by this: they name a moment after the sweep.
         odometry_late_s: the same of odometry and its tf.
         no_scans: stretches (from, to) in s in which no scan was recorded nor seen.
-        without: what the robot does not publish: "odometry", "tf".
+        without: what the robot does not have or publish: "odometry", "tf", "laser" (nor, then, a
+            localizer).
+        floor: codes in the floor that the robot reads from above.
         logged: the world the map in the log was drawn from, where it is not the robot's own.
         xyyaw_logged_map: (3) the robot's map frame in the frame of the map in the log.
     """
@@ -68,6 +72,7 @@ class Scenario:
     odometry_late_s: float = 0.0
     no_scans: tuple[tuple[float, float], ...] = ()
     without: frozenset[str] = frozenset()
+    floor: CodeFloor | None = None
     logged: World | None = None
     xyyaw_logged_map: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
@@ -221,3 +226,26 @@ def _corridor_100m() -> Scenario:
     tour = (Pause(2.0), Follow(ring, speed=0.95), Pause(2.0))
     wheels = WheelErrors(scale=0.006, turn_scale=0.009, pull=0.0015)
     return Scenario(floor, floor, (18.0, 1.0, 0.0), tour, "healthy", 9, wheels=wheels)
+
+
+#: Rounds along the lattice: a drive unit turns on a code, never between two.
+_LATTICE_ROUND = (
+    (8.0, 2.0), (8.0, 5.0), (3.0, 5.0), (3.0, 8.0), (11.0, 8.0), (11.0, 3.0), (6.0, 3.0),
+    (6.0, 9.0), (1.0, 9.0), (1.0, 2.0),
+)  # fmt: skip
+
+
+def _barcode_floor() -> Scenario:
+    hall = drive_hall()
+    floor = CodeFloor((1.0, 1.0), 12, 9, hidden=((40.0, 55.0),))
+    legs = tuple(Follow((corner,)) for corner in _LATTICE_ROUND)
+    return Scenario(
+        hall,
+        hall,
+        (1.0, 2.0, 0.0),
+        (Pause(2.0), *legs, Pause(1.0)),
+        "insufficient_data",
+        10,
+        without=frozenset({"laser"}),
+        floor=floor,
+    )

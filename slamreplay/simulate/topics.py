@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from slamreplay.geometry import se2
+from slamreplay.geometry import se2, se3
 from slamreplay.geometry.times import NS_PER_S
 from slamreplay.simulate.behavior import status_changes
+from slamreplay.simulate.codes import camera_mount
 from slamreplay.simulate.costmap import RESOLUTION_M, local_costmap
 from slamreplay.simulate.drive import RATE_HZ, Follow, Phase
 from slamreplay.simulate.localizer import odometry_at
@@ -26,6 +27,8 @@ TRANSFORM_TOLERANCE_NS = NS_PER_S
 LASER_HEIGHT_M = 0.22
 #: Seconds from an event to its place in the log.
 _ODOMETRY_LATE, _IMU_LATE, _SCAN_LATE, _AMCL_LATE, _REST_LATE = 0.002, 0.001, 0.004, 0.012, 0.003
+_CODE_LATE = 0.03
+_CAMERA = "floor_camera"
 _JITTER_S = 0.0008
 #: Topics whose last message is kept for late subscribers.
 LATCHED = frozenset({"/map", "/tf_static"})
@@ -43,7 +46,7 @@ class Record:
 
 def records(recording: Recording, messages: Messages) -> list[Record]:
     """All messages of a recording, sorted by log time."""
-    writers = (_start, _wheels, _inertial, _lidar, _navigator, _costmaps, _reference)
+    writers = (_start, _wheels, _inertial, _lidar, _codes, _navigator, _costmaps, _reference)
     found = [r for write in writers for r in write(recording, messages)]
     jitter = np.random.Generator(np.random.PCG64([recording.seed, 1]))
     delays = (_JITTER_S * 1e9 * jitter.exponential(size=len(found))).astype(np.int64).tolist()
@@ -122,6 +125,8 @@ class _Laser:
 
 def _lasers(r: Recording) -> tuple[_Laser, ...]:
     lidar, rear = r.scenario.lidar, r.scenario.rear
+    if "laser" in r.scenario.without:
+        return ()
     if rear is None or r.rear is None:
         return (_Laser("/scan", "laser", XYYAW_BASE_LASER, lidar, r.scans),)
     return (
@@ -132,6 +137,8 @@ def _lasers(r: Recording) -> tuple[_Laser, ...]:
 
 def _lidar(r: Recording, m: Messages) -> Iterator[Record]:
     """Scans, and what the localizer makes of each as soon as it is there."""
+    if not _lasers(r):
+        return
     front, *others = _lasers(r)
     b = r.beliefs
     has_odometry = "odometry" not in r.scenario.without
@@ -182,6 +189,28 @@ def _scan(r: Recording, m: Messages, laser: _Laser, i: int) -> Record:
     return Record(_ns(t_s + _arrival_s(laser)), laser.topic, "sensor_msgs/LaserScan", message)
 
 
+def _codes(r: Recording, m: Messages) -> Iterator[Record]:
+    """Readings of codes in the floor, and on /tf_static where camera and codes are."""
+    floor, readings = r.scenario.floor, r.readings
+    if floor is None or readings is None:
+        return
+    mount = m.spatial_transforms(_ns(0), "base_link", [_CAMERA], camera_mount()[None])
+    yield Record(_ns(0.005), "/tf_static", "tf2_msgs/TFMessage", mount)
+    names = [f"tag_{number}" for number in range(len(floor.places))]
+    survey = m.spatial_transforms(_ns(0), "map", names, se3.from_planar(floor.places))
+    yield Record(_ns(0.006), "/tf_static", "tf2_msgs/TFMessage", survey)
+    for t_s, number, T in zip(readings.t_s, readings.number, readings.T_camera_code, strict=True):
+        stamp = _ns(t_s)
+        found = m.code(stamp, _CAMERA, int(number), floor.size_m, T)
+        array = m.make(
+            "apriltag_ros/AprilTagDetectionArray",
+            header=m.header(stamp, _CAMERA),
+            detections=[found],
+        )
+        msgtype = "apriltag_ros/AprilTagDetectionArray"
+        yield Record(_ns(t_s + _CODE_LATE), "/tag_detections", msgtype, array)
+
+
 def _navigator(r: Recording, m: Messages) -> Iterator[Record]:
     for first in range(0, len(r.motion.t_s), RATE_HZ // 10):
         v, w = r.motion.wheels[first]
@@ -219,6 +248,8 @@ def _believed_plan(r: Recording, phase: Phase) -> se2.Array:
     points = np.vstack([points, corners[-1]])
     yaw = np.arctan2(*np.diff(points, axis=0).T[::-1])
     true = np.column_stack([points, np.append(yaw, yaw[-1])])
+    if not len(r.scans.t_s):
+        return true
     t_s = np.array([phase.first / RATE_HZ])
     scan = max(int(np.searchsorted(r.scans.t_s, t_s[0])) - 1, 0)
     believed = se2.compose(r.beliefs.map_odom[scan], odometry_at(r.odometry, t_s)[0])

@@ -160,6 +160,19 @@ def warehouse() -> World:
     )
 
 
+def drive_hall() -> World:
+    """A hall of 13 x 10 m whose floor is left to drive units; shelves stand along its wall."""
+    bounds = (0.0, 0.0, 13.0, 10.5)
+    return World(
+        bounds,
+        (
+            *room_walls("hall", bounds),
+            box("shelf", 1.5, 0.0, 3.0, 0.3),
+            box("desk", 12.5, 6.0, 0.5, 1.5),
+        ),
+    )
+
+
 def office() -> World:
     """A ring of corridors, 2 m wide, around a block of rooms; 100 m along its middle line."""
     bounds = (0.0, 0.0, 35.95, 18.2)

@@ -66,7 +66,7 @@ class Window:
 
 
 def window_of(
-    polar: se2.Array,
+    seen: se2.Array,
     dims: NDArray[np.int64],
     R: se2.Array,
     places: se2.Array,
@@ -77,35 +77,27 @@ def window_of(
     """Sightings (K, ...) brought into the base at the last one, with the noise of the way there.
 
     Args:
-        polar: (K, 3) range, bearing, heading as sensed.
+        seen: (K, 3) x, y, heading in the base as sensed.
         dims: (K,) 3 where the heading counts.
-        R: (K, 3, 3) covariance of `polar`.
+        R: (K, 3, 3) covariance of `seen`.
         places: (K, 3) the things in the map.
         thing: (K,) which ones.
         steps: (K, 3) motion to each sighting from the one before.
         Q: (K, 3, 3) its covariance, in axes of the base before it.
     """
-    K = len(polar)
+    K = len(seen)
     T, C = np.zeros((K, 3)), np.zeros((K, 3, 3))  # base at each sighting in the last base
     for k in range(K - 2, -1, -1):
         back = se2.inverse(steps[k + 1])
         T[k] = se2.compose(T[k + 1], back)
         A = _carried(T[k], T[k + 1])
         C[k] = C[k + 1] + A @ Q[k + 1] @ A.T
-    reach, bearing = polar[:, 0], polar[:, 1]
-    cos, sin = np.cos(bearing), np.sin(bearing)
-    seen = np.column_stack([reach * cos, reach * sin])
-    J = np.zeros((K, 3, 3))
-    J[:, 0, 0], J[:, 0, 1] = cos, -reach * sin
-    J[:, 1, 0], J[:, 1, 1] = sin, reach * cos
-    J[:, 2, 2] = 1.0
-    points = se2.transform_points(T, seen[:, None, :])[:, 0]
+    points = se2.transform_points(T, seen[:, None, :2])[:, 0]
     lever = np.zeros((K, 3, 3))
     lever[:] = np.eye(3)
     lever[:, 0, 2], lever[:, 1, 2] = -points[:, 1], points[:, 0]
-    cov = turned(J @ R @ np.swapaxes(J, 1, 2), T[:, 2])
-    cov = cov + lever @ C @ np.swapaxes(lever, 1, 2)
-    headings = np.where(dims == 3, se2.wrap_angle(polar[:, 2] + T[:, 2]), np.nan)
+    cov = turned(R, T[:, 2]) + lever @ C @ np.swapaxes(lever, 1, 2)
+    headings = np.where(dims == 3, se2.wrap_angle(seen[:, 2] + T[:, 2]), np.nan)
     return Window(points, headings, cov, places, thing)
 
 

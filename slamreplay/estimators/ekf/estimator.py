@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields, replace
-from difflib import get_close_matches
+from dataclasses import dataclass, field, replace
 from types import MappingProxyType
-from typing import Any, ClassVar, Self
+from typing import ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +16,7 @@ from slamreplay.bundle.scans import scan_set
 from slamreplay.bundle.sightings import sightings_of
 from slamreplay.bundle.track import PoseTrack
 from slamreplay.bundle.view import BundleView
-from slamreplay.errors import NotApplicableError, UsageError
+from slamreplay.errors import NotApplicableError
 from slamreplay.estimators.ekf import kernels
 from slamreplay.estimators.ekf.filter import filtered, gates_of
 from slamreplay.estimators.ekf.gyro import gyro_of
@@ -30,6 +29,7 @@ from slamreplay.estimators.ekf.node.parameters import (
 from slamreplay.estimators.ekf.node.run import run_node
 from slamreplay.estimators.ekf.noise import Noise
 from slamreplay.estimators.ekf.observations import Observations, after_motion, observations_of
+from slamreplay.estimators.ekf.own_parameters import numbers_of
 from slamreplay.estimators.ekf.passing import Evidence, Filtered, Held
 from slamreplay.estimators.ekf.tuning import tuned
 from slamreplay.estimators.inputs import need_odometry
@@ -46,6 +46,7 @@ NODES = (
 )  # fmt: skip
 #: Axes of the innovations: what they measure and its unit.
 AXES = ("range m", "bearing rad", "heading rad")
+CARTESIAN_AXES = ("x m", "y m", "heading rad")
 FIX_AXES, TURN_AXES = ("x m", "y m"), ("turn rad",)
 
 
@@ -94,22 +95,9 @@ class Ekf:
         """
         if names_of_inputs(given):
             return cls(node=node_parameters(given))
-        own = {item.name for item in fields(cls)} - {"noise", "node"}
-        of_noise = {item.name for item in fields(Noise)}
-        values: dict[str, dict[str, Any]] = {"own": {}, "noise": {}}
-        for name, value in given.items():
-            if name not in own | of_noise:
-                known = sorted({*own, *of_noise, "odom0", "imu0", "pose0", "twist0"})
-                near = get_close_matches(name, known, n=1)
-                hint = (
-                    f"did you mean '{near[0]}'?" if near else f"there are: {', '.join(sorted(own))}"
-                )
-                raise UsageError(f"there is no parameter '{name}'", where=cls.name, hint=hint)
-            if isinstance(value, bool) or not isinstance(value, int | float):
-                raise UsageError(f"'{name}' is {value!r}: it should be a number", where=cls.name)
-            values["own" if name in own else "noise"][name] = float(value)
-        gates_of(values["own"].get("gate_probability", cls.gate_probability))
-        return cls(noise=Noise(**values["noise"]), **values["own"])
+        own, noise = numbers_of(cls, given, cls.name, ("odom0", "imu0", "pose0", "twist0"))
+        gates_of(own.get("gate_probability", cls.gate_probability))
+        return cls(noise=noise, **own)
 
     def run(self, view: BundleView, *, seed: int) -> Estimate:  # noqa: ARG002 - nothing is random
         """One row per scan (per odometry sample without scans), NaN where there is no pose.
@@ -258,6 +246,7 @@ def _innovations(
 ) -> tuple[Innovations, ...]:
     """A set for each kind of thing and number of axes, for fixes, and for the wheels' turns."""
     seen = evidence.observations
+    axes = CARTESIAN_AXES if seen.is_cartesian else AXES
     used = done.status != kernels.UNUSED
     sets = []
     for kind in sorted(set(seen.kind.tolist())):
@@ -265,7 +254,7 @@ def _innovations(
             rows = np.flatnonzero(used & (seen.kind == kind) & (seen.dims == m))
             source = kind if m == 2 else f"{kind} with heading"
             about = seen.names[seen.thing[rows]]
-            sets.append(_set(source, done.sighted, rows, AXES[:m], base, about))
+            sets.append(_set(source, done.sighted, rows, axes[:m], base, about))
     if evidence.fixes is not None:
         rows = np.flatnonzero(done.fixed.status != kernels.UNUSED)
         about = np.full(len(rows), evidence.fixes.topic)

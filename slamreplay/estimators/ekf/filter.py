@@ -206,11 +206,12 @@ class _Pass:
             kernels.run(
                 first, end, starts, events.t_ns, events.steps.xyyaw, events.steps.Q,
                 events.turns, events.turn_variance, events.measured, events.row, self.sensed,
-                self.R, self.dims, self.thing, seen.places, self.antenna, self.gates,
-                self.lasting, self.noise.lasting_s, self.noise.gyro_bias_per_root_s**2,
-                np.array([LOST_LEAST, LOST_NS]), self.retry_ns, state.x, state.P, state.holder,
-                state.seen, state.lost, self.xyyaw, self.cov, self.updated, held.residual, held.S,
-                held.status, held.moved, self.turn_out, self.turned.status, self.turned.moved,
+                self.R, self.dims, self.thing, seen.places, seen.is_cartesian, self.antenna,
+                self.gates, self.lasting, self.noise.lasting_s,
+                self.noise.gyro_bias_per_root_s**2, np.array([LOST_LEAST, LOST_NS]),
+                self.retry_ns, state.x, state.P, state.holder, state.seen, state.lost,
+                self.xyyaw, self.cov, self.updated, held.residual, held.S, held.status,
+                held.moved, self.turn_out, self.turned.status, self.turned.moved,
             )
         )  # fmt: skip
 
@@ -245,9 +246,10 @@ class _Pass:
         times = (thing[:, None] == thing[None, :]).sum(axis=1)
         R[:, 0, 0] += times * self.lasting[0] * self.sensed[rows, 0] ** 2
         R[:, 1, 1] += times * self.lasting[1]
+        points, cov = seen.in_base(self.sensed[rows], R)
         found = locate(
             window_of(
-                self.sensed[rows], seen.dims[rows], R, seen.places[thing], thing, steps.xyyaw,
+                points, seen.dims[rows], cov, seen.places[thing], thing, steps.xyyaw,
                 self.process_scale * steps.Q,
             )
         )  # fmt: skip

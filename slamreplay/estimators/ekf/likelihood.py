@@ -31,7 +31,7 @@ def log_densities(observations: Observations, done: Filtered, noise: Noise) -> s
         done: what the filter made of them,
         noise: with these settings.
     """
-    longest = float(observations.polar[:, 0].max(initial=1.0))
+    longest = float(observations.sensed[:, 0].max(initial=1.0))
     even = -np.log(longest) - (observations.dims - 1) * np.log(2.0 * np.pi)
     fits = np.full(len(observations), -np.inf)
     for rows, m in groups(observations, done):

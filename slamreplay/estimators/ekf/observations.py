@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,9 +30,9 @@ class Observations:
         kind: (M,) fiducial or dock.
         thing: (M,) which one, 0 to T - 1.
         places: (T, 3) of the things in the map, m, m, rad; NaN where a heading is not surveyed.
-        polar: (M, 3) range m, bearing rad, heading rad in the base, as sensed.
+        sensed: (M, 3) range m, bearing rad, heading rad in the base, as sensed.
         dims: (M,) 3 where the heading was sensed and is surveyed, else 2.
-        stated: (M, 3, 3) covariance of `polar` that the log states, NaN where it does not.
+        stated: (M, 3, 3) covariance of `sensed` that the log states, NaN where it does not.
         names: (T,) of the things.
         unsurveyed: sightings of things without a survey, which are left out.
         repeated: sightings of a thing without any motion since the last one, left out too.
@@ -41,12 +42,14 @@ class Observations:
     kind: NDArray[np.object_]
     thing: NDArray[np.int64]
     places: se2.Array
-    polar: se2.Array
+    sensed: se2.Array
     dims: NDArray[np.int64]
     stated: se2.Array
     unsurveyed: int
     names: NDArray[np.str_]
     repeated: int = 0
+
+    is_cartesian: ClassVar[bool] = False
 
     @classmethod
     def none(cls) -> Observations:
@@ -58,22 +61,12 @@ class Observations:
     def __len__(self) -> int:
         return len(self.t_ns)
 
-    def take(self, index: NDArray[np.int64] | NDArray[np.bool_]) -> Observations:
+    def take(self, index: NDArray[np.int64] | NDArray[np.bool_]) -> Self:
         """Those at an index array or under a mask; the things stay the same."""
-        return Observations(
-            self.t_ns[index],
-            self.kind[index],
-            self.thing[index],
-            self.places,
-            self.polar[index],
-            self.dims[index],
-            self.stated[index],
-            self.unsurveyed,
-            self.names,
-            self.repeated,
-        )
+        parts = ("t_ns", "kind", "thing", "sensed", "dims", "stated")
+        return replace(self, **{name: getattr(self, name)[index] for name in parts})
 
-    def of_moving(self, odometry: PoseTrack, least_m: float, least_rad: float) -> Observations:
+    def of_moving(self, odometry: PoseTrack, least_m: float, least_rad: float) -> Self:
         """Without sightings of a thing from the very pose from which it was seen last.
 
         A camera at rest sees the same pixels: what it gets wrong it gets wrong again, and a
@@ -88,34 +81,51 @@ class Observations:
         return replace(self.take(keep), repeated=int((~keep).sum()))
 
     def corrected(self, noise: Noise) -> se2.Array:
-        """(M, 3) `polar` without its constant errors."""
-        out = self.polar.copy()
+        """(M, 3) `sensed` without its constant errors."""
+        out = self.sensed.copy()
         out[:, 1] = se2.wrap_angle(out[:, 1] - noise.bearing_offset_rad)
         out[:, 0] = (out[:, 0] - noise.range_offset_m) / self.stretch(noise)
         out[:, 0] = np.maximum(out[:, 0], NEAREST_M)
         return out
 
+    @staticmethod
+    def in_base(sensed: se2.Array, R: se2.Array) -> tuple[se2.Array, se2.Array]:
+        """x, y, heading (M, 3) in the base, and their covariances, of those R (M, 3, 3) of it."""
+        return cartesian(sensed, R)
+
     def stretch(self, noise: Noise) -> se2.Array:
         """(M,) by how much the ranges are measured too long, as a ratio: their constant errors."""
-        bearing = self.polar[:, 1] - noise.bearing_offset_rad
+        bearing = self.sensed[:, 1] - noise.bearing_offset_rad
         beside = se2.wrap_angle(bearing - noise.range_axis_rad)
         return noise.range_ratio * np.maximum(1.0 - noise.range_falloff * beside**2, _LEAST)
 
     def covariance(self, noise: Noise, scale: float = 1.0) -> se2.Array:
-        """(M, 3, 3) of `polar`, without lasting errors: the log's own, else from the settings.
+        """(M, 3, 3) of `sensed`, without lasting errors: the log's own, else from the settings.
 
         Args:
             noise: the settings.
             scale: ratio by which all variances are multiplied.
         """
         R = np.zeros((len(self), 3, 3))
-        R[:, 0, 0] = noise.range_m**2 + (noise.range_per_m * self.polar[:, 0]) ** 2
+        R[:, 0, 0] = noise.range_m**2 + (noise.range_per_m * self.sensed[:, 0]) ** 2
         R[:, 1, 1], R[:, 2, 2] = noise.bearing_rad**2, noise.heading_rad**2
         told = np.isfinite(self.stated[:, :2, :2]).all(axis=(1, 2))
         R[told, :2, :2] = noise.stated_ratio**2 * self.stated[told, :2, :2]
         told = np.isfinite(self.stated[:, 2, 2])
         R[told, 2, 2] = noise.stated_ratio**2 * self.stated[told, 2, 2]
         return scale * (R + _FINEST)
+
+
+def cartesian(polar: se2.Array, R: se2.Array) -> tuple[se2.Array, se2.Array]:
+    """x, y, heading (M, 3) and their covariances (M, 3, 3) of range, bearing, heading (M, 3)."""
+    reach, bearing = polar[:, 0], polar[:, 1]
+    cos, sin = np.cos(bearing), np.sin(bearing)
+    J = np.zeros((len(polar), 3, 3))
+    J[:, 0, 0], J[:, 0, 1] = cos, -reach * sin
+    J[:, 1, 0], J[:, 1, 1] = sin, reach * cos
+    J[:, 2, 2] = 1.0
+    seen = np.column_stack([reach * cos, reach * sin, polar[:, 2]])
+    return seen, J @ R @ np.swapaxes(J, 1, 2)
 
 
 def after_motion(
