@@ -14,13 +14,16 @@ LEAST_M, PER_METRE, PER_RADIAN = 0.02, 0.1, 0.05
 LEAST_RAD, RAD_PER_METRE, RAD_PER_RADIAN = 0.02, 0.05, 0.15
 #: Chi-square of 3 degrees of freedom: 99.9 %.
 GATE = 16.27
+#: Part of the disagreement by which the motion may be wrong in other directions than its own.
+ASIDE = 0.2
 
 
 def doubted(local: LocalTrajectory, odometry: PoseTrack | None) -> se2.Array:
     """Covariances (K - 1, 3, 3) of the motions, larger where odometry says something else.
 
     There the disagreement itself is added, as its outer product: the motion may be wrong by so
-    much in that direction. A closure then bends the graph there and not elsewhere.
+    much in that direction, and by a part of it in every other. A closure then bends the graph
+    there and not elsewhere.
 
     Args:
         local: nodes and motions; of motions over a break nothing is asked.
@@ -39,4 +42,6 @@ def doubted(local: LocalTrajectory, odometry: PoseTrack | None) -> se2.Array:
     odd = (chi2 > GATE) & ~local.is_break[1:]  # not where odometry is NaN
     cov = local.motion_cov.copy()
     cov[odd] += off[odd, :, None] * off[odd, None, :]
+    size = np.stack([np.hypot(off[:, 0], off[:, 1])] * 2 + [np.abs(off[:, 2])], axis=1)
+    cov[odd] += (ASIDE * size[odd, :, None]) ** 2 * np.eye(3)
     return cov

@@ -28,6 +28,10 @@ from slamreplay.geometry import se2
 
 SETTINGS = frozenset({OFFSET, ROTATE, GLOBAL, MIN_SCORE, PROCESS_NOISE, MEASUREMENT_NOISE})
 NEEDS = frozenset({"scans"})
+WITHOUT_NOISE = (
+    "it learns from the log what scans miss, and allows for errors that neighbouring beams have in "
+    "common, which no drawn world has"
+)
 
 
 @dataclass(frozen=True)
@@ -47,6 +51,7 @@ class PoseGraph:
     causal: ClassVar[bool] = False
     needs: ClassVar[frozenset[str]] = NEEDS
     settings: ClassVar[frozenset[str]] = SETTINGS
+    without_noise: ClassVar[str] = WITHOUT_NOISE
 
     @classmethod
     def from_parameters(cls, given: Mapping[str, object]) -> Self:
@@ -93,6 +98,7 @@ class PoseGraphOnline:
     name: ClassVar[str] = "pose_graph_online"
     needs: ClassVar[frozenset[str]] = NEEDS
     settings: ClassVar[frozenset[str]] = SETTINGS
+    without_noise: ClassVar[str] = WITHOUT_NOISE
 
     @classmethod
     def from_parameters(cls, given: Mapping[str, object]) -> Self:
