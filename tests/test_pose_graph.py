@@ -159,7 +159,7 @@ def test_parameters_are_set_by_name():
     with pytest.raises(UsageError, match="min_scor") as caught:
         PoseGraphOnline.from_parameters({"min_scor": 0.7})
     assert "min_score" in str(caught.value.hint)
-    with pytest.raises(UsageError, match="no number"):
+    with pytest.raises(UsageError, match="min_score"):
         PoseGraph.from_parameters({"min_score": "high"})
 
 

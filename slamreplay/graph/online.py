@@ -27,6 +27,8 @@ class OnlineGraph:
         rules = gtsam.ISAM2Params()
         rules.setRelinearizeThreshold(RELINEARISE)
         rules.relinearizeSkip = 1
+        # Certain and doubtful motions beside each other are too much for normal equations.
+        rules.setFactorization("QR")
         self._isam = gtsam.ISAM2(rules)
         self._count = 0
         self._motions: list[tuple[int, Relations]] = []

@@ -12,8 +12,8 @@ from slamreplay.geometry import se2
 from slamreplay.geometry.covariance import gtsam_from_planar, planar_from_gtsam, turned
 from slamreplay.graph.marginals import marginal_covariances
 
-#: Below this part of a sigma nobody knows a pose: a start that is certain is held by it.
-_LEAST_SIGMA = 1e-5
+#: A start that is certain is held to this, m and rad: less would only cost digits.
+_LEAST_SIGMA = 1e-4
 #: The optimum is near enough where a step gains less than this share of the error.
 _ENOUGH = 1e-5
 #: By how much the scaling of doubtful relations is narrowed at a time, and how often at the most.

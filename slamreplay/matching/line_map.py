@@ -58,10 +58,11 @@ class LineMap:
         tags = np.zeros((SIDE * SIDE, 2, 3), dtype=np.int32)
         return cls(tags, np.zeros((SIDE * SIDE, 2, 5)), memory + 1, memory)
 
-    def add(self, pose: Array, points: Array, normals: Array) -> None:
-        """Take in the lines of a node at its pose (3,)."""
+    def add(self, pose: Array, points: Array, normals: Array) -> float:
+        """Take in the lines of a node at its pose (3,); the share of the points that begin one."""
         self.now += 1
-        insert(self.tags, self.lines, self.now, self.memory, pose, points, normals)
+        new = insert(self.tags, self.lines, self.now, self.memory, pose, points, normals)
+        return new / max(len(points), 1)
 
     def clear(self) -> None:
         """Forget everything."""
@@ -78,7 +79,8 @@ class LineMap:
 
 @njit(cache=True, nogil=True)
 def insert(tags, lines, now, memory, pose, points, normals):  # type: ignore[no-untyped-def]
-    """Merge each point with the line of its cell that faces the same way, or begin one."""
+    """Merge each point with the line of its cell that faces as it does; how many begin one."""
+    new = 0
     cos, sin = np.cos(pose[2]), np.sin(pose[2])
     for p in range(points.shape[0]):
         x = pose[0] + cos * points[p, 0] - sin * points[p, 1]
@@ -105,6 +107,7 @@ def insert(tags, lines, now, memory, pose, points, normals):  # type: ignore[no-
             into = 0 if tags[at, 0, 2] <= tags[at, 1, 2] else 1
         line, tag = lines[at, into], tags[at, into]
         if not merge:
+            new += 1
             line[0], line[1], line[2], line[3], line[4] = x, y, nx, ny, 1.0
         else:
             theirs = line[2] != 0.0 or line[3] != 0.0
@@ -123,6 +126,7 @@ def insert(tags, lines, now, memory, pose, points, normals):  # type: ignore[no-
                 line[2] /= length
                 line[3] /= length
         tag[0], tag[1], tag[2] = col, row, now
+    return new
 
 
 @njit(cache=True, nogil=True)
@@ -186,18 +190,17 @@ def align(tags, lines, oldest, points, normals, pose, prior, held, sigma, varian
         Mean score of the points, mean weighted square of their distances (m^2), and how far the
         prior was trusted: Student's weight for 4 degrees of freedom, 1 where it fits.
     """
-    width, trust, moved = 4.0 * sigma, 1.0, np.inf
-    score, squares = _sum_up(tags, lines, oldest, points, normals, pose, width, 2, out)
-    for turn in range(steps):
+    width, trust, is_done, turn = 4.0 * sigma, 1.0, False, 0
+    while True:
+        # One call, for each would be compiled by itself.
+        reach = 2 if turn <= WIDE_STEPS else 1
+        score, squares = _sum_up(tags, lines, oldest, points, normals, pose, width, reach, out)
+        if is_done or turn == steps:
+            return score, squares, trust
         trust, moved = _step(out, variance, prior, held, pose)
         narrow = max(2.0 * sigma, 0.7 * width)
-        reach = 2 if turn < WIDE_STEPS else 1
         is_done = moved < SMALL and narrow == width and turn >= WIDE_STEPS
-        width = narrow
-        score, squares = _sum_up(tags, lines, oldest, points, normals, pose, width, reach, out)
-        if is_done:
-            break
-    return score, squares, trust
+        width, turn = narrow, turn + 1
 
 
 @njit(cache=True, nogil=True)

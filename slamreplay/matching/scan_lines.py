@@ -36,7 +36,7 @@ def scan_lines(reach, is_hit, bearing, step, mount, during, points, normals):  #
         points: (B, 2), written, m.
         normals: (B, 2), written: unit, towards the laser; 0 where there is no line.
     """
-    width, count, members = reach.shape[0], 0, 0
+    width, count, members = reach.shape[0], np.int64(0), 0
     first_x = first_y = last_x = last_y = 0.0
     is_moving = during[0] != 0.0 or during[1] != 0.0 or during[2] != 0.0
     for b in range(width):

@@ -16,7 +16,7 @@ def carried_covariances(local: LocalTrajectory, poses: se2.Array, cov: se2.Array
     """Covariances (N, 3, 3) of all scans from those of the nodes (K, 3, 3) at `poses` (K, 3).
 
     A scan between two nodes has of both their errors what `LocalTrajectory.carried` takes of their
-    poses, and beside it its own against the node before.
+    poses. What each scan misses by itself, and its neighbours do not, comes on top.
     """
     out = np.full((len(local.xyyaw), 3, 3), np.nan)
     node = local.node_of
@@ -29,7 +29,6 @@ def carried_covariances(local: LocalTrajectory, poses: se2.Array, cov: se2.Array
     part = ((rows - first) / np.maximum(last - first, 1))[:, None, None]
     each = [_swung(here, poses[k], cov[k]) for k in (low, high)]
     own = turned(local.cov[rows], here[:, 2] - local.xyyaw[rows, 2])
-    own[rows == first] = 0.0  # a node's own error is in its covariance already
     total = (1.0 - part) * each[0] + part * each[1] + own
     out[rows] = (total + np.swapaxes(total, 1, 2)) / 2.0
     return out
@@ -66,7 +65,6 @@ def as_driven(
     total = _swung(along, poses, start_cov) + turned(since, poses[:, 2])
     total = _swung(xyyaw[rows], along, total)
     own = turned(local.cov[rows], xyyaw[rows, 2] - local.xyyaw[rows, 2])
-    own[rows == local.nodes[last]] = 0.0
     total = total + own
     cov[rows] = (total + np.swapaxes(total, 1, 2)) / 2.0
     return xyyaw, cov

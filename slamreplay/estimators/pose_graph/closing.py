@@ -23,6 +23,9 @@ from slamreplay.graph.relations import Relations
 SIGMAS, MARGIN_M, MARGIN_RAD = 3.0, 0.1, np.radians(2.0)
 #: A heading that is known no better than to this may be any, rad.
 ANY_HEADING = np.pi / 4.0
+#: So many matches tell whether motions err more than they say; the median of chi-square of 3
+#: degrees of freedom; and the largest ratio that is believed.
+ENOUGH, MEDIAN, MOST_RATIO = 5, 2.366, 10.0
 #: Closures that confirm each other come from submaps at most so many apart.
 TOGETHER = 6
 
@@ -115,13 +118,13 @@ def close_loops(
         closer.take(new)
         belief.append(closer.poses[new])
         if with_cov:
-            cov.append(closer.graph.marginal(new))
+            cov.append(closer.graph.marginal(new) * closer.ratio)
     return Closed(
         tuple(closer.candidates[k] for k in sorted(closer.candidates)),
         np.array(belief),
         np.array(cov) if with_cov else np.empty((0, 3, 3)),
         closer.poses,
-        closer.loosened,
+        closer.loosened * closer.ratio,
     )
 
 
@@ -135,9 +138,21 @@ class _Closer:
         self.poses = graph.poses
         self.candidates: dict[int, Candidate] = {}  # by the new submap
         self.loosened = np.ones(len(maps) - 1)
+        self._told: list[float] = []  # NIS of good matches, had the motions erred as they say
         self._waiting: list[int] = []
         self._searcher = Searcher()
         self._last = maps.way[maps.stops[1:] - 1]  # way to the last node of each
+
+    @property
+    def ratio(self) -> float:
+        """How many times larger the motions' covariances are than they say, by the matches so far.
+
+        The median of their NIS over what it should be, so that a single slip does not count; never
+        less than 1, for where matches err most themselves they tell nothing.
+        """
+        if len(self._told) < ENOUGH:
+            return 1.0
+        return float(np.clip(np.median(self._told) / MEDIAN, 1.0, MOST_RATIO))
 
     def take(self, new: int) -> None:
         """Add a submap to the graph, and look for it."""
@@ -150,7 +165,7 @@ class _Closer:
             return
         away = self._away(old, self.poses[new])
         near = int(old[np.argmin(away)])
-        S = self.graph.relative(self.poses, near, new)
+        S = self.graph.relative(self.poses, near, new) * self.ratio
         sigma = float(np.sqrt(np.linalg.eigvalsh(S[:2, :2])[-1]))
         reach_m, reach_rad = SIGMAS * sigma + MARGIN_M, SIGMAS * np.sqrt(S[2, 2]) + MARGIN_RAD
         reach_rad = np.pi if reach_rad > ANY_HEADING else float(reach_rad)
@@ -191,8 +206,11 @@ class _Closer:
         z = se2.between(poses[on], there)
         residual = z - se2.between(poses[on], poses[new])
         residual[2] = se2.wrap_angle(residual[2])
-        S = self.graph.relative(poses, on, new) + cov
+        relative = self.graph.relative(poses, on, new)
+        S = relative * self.ratio + cov
         nis = float(residual @ np.linalg.solve(S, residual))
+        if place.score >= self.config.min_score:
+            self._told.append(float(residual @ np.linalg.solve(relative + cov, residual)))
         return Candidate(on, new, z, cov, place.score, residual, S, nis)
 
     def _judge(self, found: Candidate, *, is_sure: bool) -> None:
@@ -241,7 +259,8 @@ class _Closer:
         """
         maps, poses = self.maps, self.poses
         motion = maps.between(one.new, two.new)
-        cov = composed(one.xyyaw, one.cov, motion, maps.covariance(one.new, two.new))
+        since = maps.covariance(one.new, two.new) * self.ratio
+        cov = composed(one.xyyaw, one.cov, motion, since)
         old = se2.between(poses[two.old], poses[one.old])
         z = se2.compose(old, se2.compose(one.xyyaw, motion))
         off = two.xyyaw - z

@@ -23,8 +23,8 @@ class GraphConfig:
             the motions: they are then trusted less.
         gate: chi-square of 3 degrees of freedom that a closure may be off: 99.9 %.
         phi: chi-square beyond which a closure is switched off gradually.
-        trust: share of the curvature of a match's score that counts as information: neighbouring
-            points err alike.
+        trust: information of a match over the curvature of its score. The score is broader than
+            the errors of points, but neighbouring points err alike.
         closure_m: and what is left of a closure's error at the least, m.
         closure_rad: rad.
         rounds: of laying nodes onto nodes of other passes.
@@ -43,7 +43,7 @@ class GraphConfig:
     confirmations: int = 2
     gate: float = 16.27
     phi: float = 5.0
-    trust: float = 0.5
+    trust: float = 1.0
     closure_m: float = 0.01
     closure_rad: float = 0.003
     rounds: int = 3

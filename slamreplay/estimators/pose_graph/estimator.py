@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields, replace
-from difflib import get_close_matches
+from dataclasses import dataclass, field
 from typing import ClassVar, Self
 
 import numpy as np
@@ -12,10 +11,10 @@ import numpy as np
 from slamreplay.bundle.run import Estimate
 from slamreplay.bundle.track import PoseTrack
 from slamreplay.bundle.view import BundleView
-from slamreplay.errors import UsageError
+from slamreplay.estimators.parameters import settings_from
 from slamreplay.estimators.pose_graph.carrying import as_driven, carried_covariances
 from slamreplay.estimators.pose_graph.config import GraphConfig
-from slamreplay.estimators.pose_graph.ledger import closures_ledger, matches_ledger
+from slamreplay.estimators.pose_graph.ledger import closures_ledger
 from slamreplay.estimators.pose_graph.slam import (
     MEASUREMENT_NOISE,
     MIN_SCORE,
@@ -23,11 +22,16 @@ from slamreplay.estimators.pose_graph.slam import (
     Slam,
     slam_of,
 )
+from slamreplay.estimators.scan_matching.ledger import match_innovations
 from slamreplay.estimators.start import GLOBAL, OFFSET, ROTATE
 from slamreplay.geometry import se2
 
 SETTINGS = frozenset({OFFSET, ROTATE, GLOBAL, MIN_SCORE, PROCESS_NOISE, MEASUREMENT_NOISE})
 NEEDS = frozenset({"scans"})
+WITHOUT_NOISE = (
+    "it learns from the log what scans miss, and allows for errors that neighbouring beams have in "
+    "common, which no drawn world has"
+)
 
 
 @dataclass(frozen=True)
@@ -47,15 +51,16 @@ class PoseGraph:
     causal: ClassVar[bool] = False
     needs: ClassVar[frozenset[str]] = NEEDS
     settings: ClassVar[frozenset[str]] = SETTINGS
+    without_noise: ClassVar[str] = WITHOUT_NOISE
 
     @classmethod
     def from_parameters(cls, given: Mapping[str, object]) -> Self:
         """The estimator with some hyper-parameters set.
 
         Raises:
-            UsageError: there is no such parameter, or its value is no number.
+            UsageError: one that there is not, or a value that it cannot take.
         """
-        return cls(_configured(given, cls.name))
+        return cls(settings_from(GraphConfig, given, where=cls.name))
 
     def run(self, view: BundleView, *, seed: int) -> Estimate:  # noqa: ARG002 - nothing is random
         """One row per scan, NaN before the first scan that shows anything.
@@ -93,15 +98,16 @@ class PoseGraphOnline:
     name: ClassVar[str] = "pose_graph_online"
     needs: ClassVar[frozenset[str]] = NEEDS
     settings: ClassVar[frozenset[str]] = SETTINGS
+    without_noise: ClassVar[str] = WITHOUT_NOISE
 
     @classmethod
     def from_parameters(cls, given: Mapping[str, object]) -> Self:
         """The estimator with some hyper-parameters set.
 
         Raises:
-            UsageError: there is no such parameter, or its value is no number.
+            UsageError: one that there is not, or a value that it cannot take.
         """
-        return cls(_configured(given, cls.name))
+        return cls(settings_from(GraphConfig, given, where=cls.name))
 
     def run(self, view: BundleView, *, seed: int) -> Estimate:  # noqa: ARG002 - nothing is random
         """As of `PoseGraph`; NaN before the start, too.
@@ -131,19 +137,6 @@ def _estimate(
         "closures_accepted": float(closures.accepted.sum()),
         **more,
     }
-    return Estimate(track, (matches_ledger(local), closures), {"score": local.scan_score}, scalars)
-
-
-def _configured(given: Mapping[str, object], where: str) -> GraphConfig:
-    config = GraphConfig()
-    known = {f.name: type(getattr(config, f.name)) for f in fields(GraphConfig)}
-    changed: dict[str, float] = {}
-    for name, value in given.items():
-        if name not in known:
-            near = get_close_matches(name, known, n=1)
-            hint = f"did you mean '{near[0]}'?" if near else f"there are: {', '.join(known)}"
-            raise UsageError(f"{where} has no parameter '{name}'", hint=hint)
-        if isinstance(value, bool) or not isinstance(value, int | float):
-            raise UsageError(f"{where}: '{name}' is no number: {value!r}")
-        changed[name] = known[name](value)
-    return replace(config, **changed)  # type: ignore[arg-type]
+    return Estimate(
+        track, (match_innovations(local), closures), {"score": local.scan_score}, scalars
+    )

@@ -1,4 +1,4 @@
-"""The residual ledger: every match, taken or not, against what was expected before it."""
+"""The residual ledger of loop closures: each place found, against where it was expected."""
 
 from __future__ import annotations
 
@@ -6,9 +6,7 @@ import numpy as np
 
 from slamreplay.bundle.run import Innovations
 from slamreplay.estimators.pose_graph.slam import Slam
-from slamreplay.estimators.scan_matching.local import LocalTrajectory
-
-AXES = ("x m", "y m", "yaw rad")
+from slamreplay.estimators.scan_matching.ledger import AXES
 
 
 def closures_ledger(slam: Slam) -> Innovations:
@@ -36,23 +34,4 @@ def closures_ledger(slam: Slam) -> Innovations:
         np.array([c.moved for c in found]).reshape(n, 3),
         np.array(about, dtype=np.str_),
         np.array([c.score for c in found]),
-    )
-
-
-def matches_ledger(local: LocalTrajectory) -> Innovations:
-    """A row for each scan that was matched to the local map."""
-    rows = [k for k, fit in enumerate(local.fits) if fit is not None and np.isfinite(fit.score)]
-    fits = [fit for k in rows if (fit := local.fits[k]) is not None]
-    n = len(rows)
-    return Innovations(
-        "scan match",
-        local.t_ns[rows],
-        np.array([f.residual for f in fits]).reshape(n, 3),
-        np.array([f.S for f in fits]).reshape(n, 3, 3),
-        np.array([f.accepted for f in fits], dtype=bool),
-        AXES,
-        "local",
-        np.array([f.moved for f in fits]).reshape(n, 3),
-        np.empty(0, dtype="U1"),
-        np.array([f.score for f in fits]),
     )

@@ -13,6 +13,7 @@ from slamreplay.estimators.inputs import need_scans
 from slamreplay.estimators.pose_graph.beginning import Beginning, beginning
 from slamreplay.estimators.pose_graph.closing import Closed, close_loops
 from slamreplay.estimators.pose_graph.config import GraphConfig
+from slamreplay.estimators.pose_graph.doubt import doubted
 from slamreplay.estimators.pose_graph.smoothing import Smoothed, smoothed
 from slamreplay.estimators.pose_graph.submaps import Submaps, chain_covariances, submaps
 from slamreplay.estimators.scan_matching.local import LocalTrajectory, local_trajectory
@@ -57,9 +58,11 @@ def slam_of(view: BundleView, config: GraphConfig, estimator: str, *, is_online:
         NotApplicableError: no scans, or none with enough points.
     """
     scans = need_scans(view, estimator)
-    local = local_trajectory(scans, odometry_track(view))
+    odometry = odometry_track(view)
+    local = local_trajectory(scans, odometry)
     if not len(local.nodes):
         raise NotApplicableError("no scan has enough points to be matched", where=estimator)
+    local = replace(local, motion_cov=doubted(local, odometry))
     motion_scale = view.settings.get(PROCESS_NOISE, 1.0)
     match_scale = view.settings.get(MEASUREMENT_NOISE, 1.0)
     config = replace(config, min_score=view.settings.get(MIN_SCORE, config.min_score))

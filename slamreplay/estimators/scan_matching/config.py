@@ -22,7 +22,6 @@ class MatchConfig:
         position_per_turn: m after turning by 1 rad.
         heading_per_metre: and of the heading, rad after 1 m.
         heading_per_turn: rad after turning by 1 rad.
-        drift_part: of a match's variance the map takes on so much as drift.
         late_part: a scan's stamp is off by this share of the time between two scans.
         doubted: a match that scores less than this share of what matches do is looked for again.
         poor: one that scores less than this share is none.
@@ -33,12 +32,11 @@ class MatchConfig:
     node_rad: float = 0.2
     memory: int = 60
     sigma_m: float = 0.02
-    points_per_fact: float = 3.0
-    position_per_metre: float = 0.03
-    position_per_turn: float = 0.03
-    heading_per_metre: float = 0.1
-    heading_per_turn: float = 0.15
-    drift_part: float = 0.1
+    points_per_fact: float = 2.0
+    position_per_metre: float = 0.025
+    position_per_turn: float = 0.025
+    heading_per_metre: float = 0.08
+    heading_per_turn: float = 0.12
     late_part: float = 0.05
     doubted: float = 0.8
     poor: float = 0.45

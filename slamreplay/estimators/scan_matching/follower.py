@@ -34,6 +34,8 @@ STEADY_RATE = 0.25
 RATE = 0.02
 #: A point's standard deviation about its line is not less than this, m.
 FINEST_M = 0.005
+#: A node that brings less new than this share drifts as if it did.
+LEAST_NEW = 0.01
 MOST_STEPS = 20
 
 
@@ -75,8 +77,6 @@ class Follower:
         map: lines of the nodes so far, forgotten where they were not seen again.
         pose: (3,) of the last scan.
         cov: (3, 3) of it against the last node, about axes of the local frame.
-        drift: (3, 3) of what of its error the map takes on: much of a match's error is gone with
-            the next, for a node is laid onto many.
         carried: (3, 3) of it, had nothing been matched since.
         motion: (3,) from the scan before, in the axes of the base there.
         steady: (3,) of the last scans.
@@ -90,7 +90,6 @@ class Follower:
     config: MatchConfig
     pose: se2.Array = field(default_factory=lambda: np.zeros(3))
     cov: se2.Array = field(default_factory=lambda: np.zeros((3, 3)))
-    drift: se2.Array = field(default_factory=lambda: np.zeros((3, 3)))
     carried: se2.Array = field(default_factory=lambda: np.zeros((3, 3)))
     motion: se2.Array = field(default_factory=lambda: np.zeros(3))
     steady: se2.Array = field(default_factory=lambda: np.zeros(3))
@@ -114,20 +113,29 @@ class Follower:
     def begin(self, points: se2.Array, normals: se2.Array) -> None:
         """A new map, of one scan at the present pose."""
         self.map.clear()
-        self.add_node(points, normals)
-        self.lost = 0
+        self.map.add(self.pose, points, normals)
+        self._start_node()
+
+    def _start_node(self) -> None:
+        self.cov, self.carried = np.zeros((2, 3, 3))
+        self.lost, self._field = 0, None
 
     def add_node(self, points: se2.Array, normals: se2.Array) -> tuple[se2.Array, se2.Array]:
         """Put the last scan into the map.
+
+        The map drifts by a node's error as far as the node brings new lines: where it shows what
+        is there already, the next one is laid onto the same as it was.
 
         Returns:
             Covariances (3, 3) of the map's drift since the node before, and of what the scan
             misses by itself.
         """
-        self.map.add(self.pose, points, normals)
-        drift, own = self.drift.copy(), self.cov - self.drift
-        self.cov, self.drift, self.carried = np.zeros((3, 3, 3))
-        self._field = None
+        new = self.map.add(self.pose, points, normals)
+        drift = np.empty((3, 3))
+        held = self._told[21:].reshape(3, 3) / max(new, LEAST_NEW)
+        fusion.both(self.carried, held, drift, self._room)
+        own = self.cov - drift
+        self._start_node()
         return drift, own
 
     def follow(
@@ -212,8 +220,6 @@ class Follower:
         if self.is_refuted:  # wheels that slip, a robot that is carried
             self.carried += np.outer(moved, moved)
         fusion.both(self.carried, told[12:21].reshape(3, 3), self.cov, self._room)
-        held = told[21:].reshape(3, 3) / self.config.drift_part
-        fusion.both(self.carried, held, self.drift, self._room)
         fusion.learn(self._noise, told, self.learned)
         self.typical += RATE * (score - self.typical)
         self.variance += RATE * (self._squares - self.variance)
@@ -228,7 +234,7 @@ class Follower:
     def _missed(self, prior: se2.Array, score: float) -> Fit:
         """Go on by odometry alone."""
         self.pose = prior
-        self.cov, self.drift = self.carried.copy(), self.carried.copy()
+        self.cov = self.carried.copy()
         self.motion, self.steady = np.zeros(3), np.zeros(3)
         residual, S = np.full(3, np.nan), np.full((3, 3), np.nan)
         if score == score:
