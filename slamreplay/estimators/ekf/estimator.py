@@ -46,7 +46,7 @@ NODES = (
 )  # fmt: skip
 #: Axes of the innovations: what they measure and its unit.
 AXES = ("range m", "bearing rad", "heading rad")
-CARTESIAN_AXES = ("x m", "y m", "heading rad")
+NEAR_AXES = ("x m", "y m", "heading rad")
 FIX_AXES, TURN_AXES = ("x m", "y m"), ("turn rad",)
 
 
@@ -244,17 +244,18 @@ def _counts(what: str, held: Held) -> dict[str, float]:
 def _innovations(
     evidence: Evidence, done: Filtered, frame: str, base: str
 ) -> tuple[Innovations, ...]:
-    """A set for each kind of thing and number of axes, for fixes, and for the wheels' turns."""
+    """A set for each kind of thing and its axes, for fixes, and for the wheels' turns."""
     seen = evidence.observations
-    axes = CARTESIAN_AXES if seen.is_cartesian else AXES
     used = done.status != kernels.UNUSED
     sets = []
     for kind in sorted(set(seen.kind.tolist())):
-        for m in (2, 3):
-            rows = np.flatnonzero(used & (seen.kind == kind) & (seen.dims == m))
-            source = kind if m == 2 else f"{kind} with heading"
-            about = seen.names[seen.thing[rows]]
-            sets.append(_set(source, done.sighted, rows, axes[:m], base, about))
+        for near, m in ((False, 2), (False, 3), (True, 2), (True, 3)):
+            of_kind = (seen.kind == kind) & (seen.is_near == near) & (seen.dims == m)
+            rows = np.flatnonzero(used & of_kind)
+            source = f"{'near ' * near}{kind}{' with heading' * (m == 3)}"
+            axes, about = (NEAR_AXES if near else AXES)[:m], seen.names[seen.thing[rows]]
+            in_axes = frame if near and m == 3 else base
+            sets.append(_set(source, done.sighted, rows, axes, in_axes, about))
     if evidence.fixes is not None:
         rows = np.flatnonzero(done.fixed.status != kernels.UNUSED)
         about = np.full(len(rows), evidence.fixes.topic)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,7 +43,10 @@ class Codes(Observations):
 
     code_noise: CodeNoise = CodeNoise(0.005, 0.02, 0.01)
 
-    is_cartesian: ClassVar[bool] = True
+    @property
+    def is_near(self) -> NDArray[np.bool_]:
+        """(M,) all: a code is held against x and y wherever it was seen."""
+        return np.ones(len(self), dtype=bool)
 
     def corrected(self, noise: Noise) -> se2.Array:  # noqa: ARG002 - no lens is known
         """(M, 3) `sensed`, as it is."""

@@ -16,6 +16,7 @@ from slamreplay.errors import NotApplicableError, UsageError
 from slamreplay.estimators.ekf.estimator import SETTINGS, estimate_of, scales_of
 from slamreplay.estimators.ekf.filter import filtered, gates_of
 from slamreplay.estimators.ekf.gyro import gyro_of
+from slamreplay.estimators.ekf.kernels import ACCEPTED
 from slamreplay.estimators.ekf.noise import Noise
 from slamreplay.estimators.ekf.own_parameters import numbers_of
 from slamreplay.estimators.ekf.passing import Evidence
@@ -135,10 +136,13 @@ class FiducialGrid:
             scalars["lattice_spacing_m"] = lattice.spacing_m
             scalars["lattice_columns"] = float(lattice.columns)
             scalars["lattice_share"] = lattice.share
-        taken = codes.t_ns[done.status == 1]
+        taken = codes.t_ns[done.status == ACCEPTED]
         ends = np.concatenate([row_ns[:1], taken, row_ns[-1:]])
         scalars["longest_without_code_s"] = float(np.diff(ends).max(initial=0)) / NS_PER_S
-        return replace(estimate, scalars=scalars)
+        sets = tuple(
+            replace(one, source=one.source.removeprefix("near ")) for one in estimate.innovations
+        )
+        return replace(estimate, innovations=sets, scalars=scalars)
 
 
 def _places(
