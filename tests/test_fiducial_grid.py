@@ -26,7 +26,7 @@ from slamreplay.simulate.pipeline import simulate
 from slamreplay.testing.estimators import check_estimator
 
 WIDE, GATES = gates_of(1.0 - 1e-12), gates_of(0.999)
-NOISE = CodeNoise(0.01, 0.05, 0.02)
+NOISE = CodeNoise(0.012, 0.02)
 COLUMNS, ROWS = 16, 14
 
 
@@ -49,10 +49,7 @@ def among_codes(seed, seconds=60.0, hidden=(), wrong=0.0, spacing=0.7, name="tag
         seen &= (t_ns < low * 10**9) | (t_ns >= high * 10**9)
     rows = np.flatnonzero(seen)
     away = se2.between(truth[rows], places[code[rows]])
-    sigma = np.hypot(NOISE.code_m, NOISE.code_per_m * np.hypot(*away[:, :2].T))
-    noise = rng.standard_normal((len(rows), 3)) * np.column_stack(
-        [sigma, sigma, np.full(len(rows), NOISE.code_rad)]
-    )
+    noise = rng.standard_normal((len(rows), 3)) * [NOISE.code_m, NOISE.code_m, NOISE.code_rad]
     misread = rng.random(len(rows)) < wrong
     other = (code[rows] + rng.integers(1, len(places), len(rows))) % len(places)
     number = np.where(misread, other, code[rows])

@@ -22,6 +22,7 @@ from slamreplay.estimators.ekf.filter import filtered, gates_of
 from slamreplay.estimators.ekf.gyro import gyro_of
 from slamreplay.estimators.ekf.node.parameters import (
     LIVE,
+    NAMES,
     NodeParameters,
     names_of_inputs,
     node_parameters,
@@ -80,6 +81,7 @@ class Ekf:
     needs: ClassVar[frozenset[str]] = frozenset({"odometry"})
     settings: ClassVar[frozenset[str]] = SETTINGS
     parameter_nodes: ClassVar[tuple[str, ...]] = NODES
+    parameter_names: ClassVar[frozenset[str]] = NAMES
     live_parameters: ClassVar[tuple[str, ...]] = LIVE
 
     @classmethod
