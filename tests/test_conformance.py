@@ -19,6 +19,7 @@ ESTIMATOR_LINES = {
     "ekf_tuned": (1e-3, 1e-3),
     "pose_graph": (0.02, 0.01),
     "pose_graph_online": (0.02, 0.01),
+    "fiducial_grid": (1e-6, 1e-6),
     "recorded": (1e-6, 1e-6),
     "recorded_pose": (1e-6, 1e-6),
     "recorded_tf": (1e-6, 1e-6),
