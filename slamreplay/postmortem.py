@@ -22,7 +22,7 @@ from slamreplay.estimators.recorded import recorded_names
 from slamreplay.hindsight.pipeline import hindsight
 from slamreplay.replay.metrics import trial_metrics
 from slamreplay.report.evidence import Postmortem, TrialResult
-from slamreplay.report.metrics import run_metrics
+from slamreplay.report.metrics import asked_of, run_metrics
 from slamreplay.verdict.judge import judge
 from slamreplay.verdict.limits import Limits
 
@@ -75,7 +75,7 @@ def postmortem(
     reference, kind = (None, None) if best is None else (best.track, best.kind)
     findings = [*judgement.findings, *unused_references(bundle, context.updates)]
     findings += sensed_references(bundle, found, hold_out)
-    of_runs = [CheckContext.of_run(run, references, view) for run in runs]
+    of_runs = [asked_of(run, references, view) for run in runs]
     # What the localizer said was asked already, as the robot's own belief.
     rerun = [
         asked
