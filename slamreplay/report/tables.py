@@ -55,12 +55,15 @@ class Table:
 def table(
     head: tuple[str, ...], rows: Sequence[Sequence[str | Cell]], more_in: str = "report.json"
 ) -> Table:
-    """A table of the first rows; the rest is counted, and named the file that has it."""
+    """A table of the first rows; the rest is counted, and named the file that has it.
+
+    Nothing is left out of a table that no file has: `more_in` is empty then.
+    """
+    most = MOST_ROWS if more_in else len(rows)
     shown = tuple(
-        tuple(cell if isinstance(cell, Cell) else Cell(cell) for cell in row)
-        for row in rows[:MOST_ROWS]
+        tuple(cell if isinstance(cell, Cell) else Cell(cell) for cell in row) for row in rows[:most]
     )
-    return Table(head, shown, max(0, len(rows) - MOST_ROWS), more_in)
+    return Table(head, shown, len(rows) - len(shown), more_in)
 
 
 def intervals(post: Postmortem) -> Table:
