@@ -69,10 +69,10 @@ def _row(post: Postmortem, one: Traced) -> tuple[str | Cell, ...]:
     residual = [float(r) for r in seen.residual[one.row]]
     names = names if len(names) == len(residual) else [""] * len(residual)
     units = units if len(units) == len(residual) else [""] * len(residual)
-    score = float(seen.score[one.row])
+    score, about = float(seen.score[one.row]), str(seen.about[one.row])
     return (
         seconds(one.t_ns - post.manifest.start_ns),
-        Cell(f"{seen.source} {seen.about[one.row]}".strip(), seen.frame_id),
+        Cell(": ".join(text for text in (seen.source, about) if text), seen.frame_id),
         _moved(one.metres, one.radians),
         _numbers(residual, names, units),
         _numbers(list(one.sigma), [""] * len(residual), units),
