@@ -27,6 +27,8 @@ from slamreplay.estimators.start import GLOBAL, OFFSET, ROTATE
 from slamreplay.geometry import se2
 
 SETTINGS = frozenset({OFFSET, ROTATE, GLOBAL, MIN_SCORE, PROCESS_NOISE, MEASUREMENT_NOISE})
+#: Why the conformance kit cannot make a world that has its noise.
+WITHOUT_NOISE = "what a match weighs is measured on the log, not told"
 NEEDS = frozenset({"scans"})
 
 
@@ -47,6 +49,7 @@ class PoseGraph:
     causal: ClassVar[bool] = False
     needs: ClassVar[frozenset[str]] = NEEDS
     settings: ClassVar[frozenset[str]] = SETTINGS
+    without_noise: ClassVar[str] = WITHOUT_NOISE
 
     @classmethod
     def from_parameters(cls, given: Mapping[str, object]) -> Self:
@@ -93,6 +96,7 @@ class PoseGraphOnline:
     name: ClassVar[str] = "pose_graph_online"
     needs: ClassVar[frozenset[str]] = NEEDS
     settings: ClassVar[frozenset[str]] = SETTINGS
+    without_noise: ClassVar[str] = WITHOUT_NOISE
 
     @classmethod
     def from_parameters(cls, given: Mapping[str, object]) -> Self:
