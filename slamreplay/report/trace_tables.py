@@ -43,11 +43,11 @@ def trace_note(post: Postmortem) -> str:
     when = seconds(post.trace_ns - post.manifest.start_ns)
     if not post.traces:
         return f"No run has a ledger that could tell what moved the belief around {when}."
-    return (
-        f"Measurements within 5 s of {when}, those that moved the belief most first. What a "
-        f"recorded localizer measured nobody recorded: only how far each of its words moved it. "
-        f"{LEDGER_FILE} has every row."
-    )
+    text = f"Measurements within 5 s of {when}, those that moved the belief most first. "
+    if post.recorded:
+        text += "What a recorded localizer measured nobody recorded: only how far each of its "
+        text += "words moved it. "
+    return f"{text}{LEDGER_FILE} has every row."
 
 
 def _title(one: RunTrace) -> str:
@@ -70,9 +70,10 @@ def _row(post: Postmortem, one: Traced) -> tuple[str | Cell, ...]:
     names = names if len(names) == len(residual) else [""] * len(residual)
     units = units if len(units) == len(residual) else [""] * len(residual)
     score, about = float(seen.score[one.row]), str(seen.about[one.row])
+    what = about if about.startswith(seen.source) else f"{seen.source}: {about}".removesuffix(": ")
     return (
         seconds(one.t_ns - post.manifest.start_ns),
-        Cell(": ".join(text for text in (seen.source, about) if text), seen.frame_id),
+        Cell(what, seen.frame_id),
         _moved(one.metres, one.radians),
         _numbers(residual, names, units),
         _numbers(list(one.sigma), [""] * len(residual), units),

@@ -71,7 +71,7 @@ def row_words(one: Innovations, row: int) -> str:
         float(one.score[row]),
         float(one.nis_of(np.array([row]))[0]),
     )
-    words = [f"{one.source} {about}".strip()]
+    words = [about if about.startswith(one.source) else f"{one.source} {about}".strip()]
     words += [f"score {score:.2f}"] if np.isfinite(score) else []
     words += [f"NIS {nis:.3g}"] if np.isfinite(nis) else []
     return ", ".join(words)
