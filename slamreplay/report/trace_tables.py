@@ -56,9 +56,11 @@ def _title(one: RunTrace) -> str:
 
 
 def _rows(post: Postmortem, one: RunTrace) -> Table:
-    rows = [_row(post, traced) for traced in one.rows[:_SHOWN]]
-    shown = table(_HEAD, rows)
-    return Table(shown.head, shown.rows, max(0, len(one.rows) - _SHOWN), LEDGER_FILE)
+    shown = table(_HEAD, [_row(post, traced) for traced in one.rows[:_SHOWN]])
+    columns = zip(shown.head, *shown.rows, strict=True)
+    told = [column for column in columns if {cell.text for cell in column[1:]} != {NOT_KNOWN}]
+    head, *rows = zip(*told, strict=True)
+    return Table(head, tuple(rows), max(0, len(one.rows) - _SHOWN), LEDGER_FILE)
 
 
 def _row(post: Postmortem, one: Traced) -> tuple[str | Cell, ...]:
