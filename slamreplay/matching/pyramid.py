@@ -48,7 +48,7 @@ class Pyramid:
 
 
 def pyramid(field: ScoreField) -> Pyramid:
-    """The bounds of a field, 15 bytes a cell; making them costs about what one search costs."""
+    """The bounds of a field: 15 bytes for each cell of it and of its margin."""
     largest = 1 << LEVELS
     margin = 2 * largest
     height, width = (-(-(n + margin) // largest) * largest for n in field.values.shape)
