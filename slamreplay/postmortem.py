@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
+from dataclasses import replace
 
 from slamreplay.bundle.belief import belief_times, recorded_belief
 from slamreplay.bundle.findings import SEVERITIES, Finding
@@ -13,6 +14,7 @@ from slamreplay.consistency.answers import raised
 from slamreplay.consistency.asking import answered
 from slamreplay.consistency.belief.credibility import nees_of_belief
 from slamreplay.consistency.belief.jumps.found import jumps_of
+from slamreplay.consistency.belief.jumps.log_events import with_subjects
 from slamreplay.consistency.belief.summary import consistency_summaries
 from slamreplay.consistency.context import CheckContext
 from slamreplay.consistency.evidence.references import references_of, unused_references
@@ -22,7 +24,7 @@ from slamreplay.estimators.recorded import recorded_names
 from slamreplay.hindsight.pipeline import hindsight
 from slamreplay.replay.metrics import trial_metrics
 from slamreplay.report.evidence import Postmortem, TrialResult
-from slamreplay.report.metrics import run_metrics
+from slamreplay.report.metrics import asked_of, run_metrics
 from slamreplay.verdict.judge import judge
 from slamreplay.verdict.limits import Limits
 
@@ -75,7 +77,7 @@ def postmortem(
     reference, kind = (None, None) if best is None else (best.track, best.kind)
     findings = [*judgement.findings, *unused_references(bundle, context.updates)]
     findings += sensed_references(bundle, found, hold_out)
-    of_runs = [CheckContext.of_run(run, references, view) for run in runs]
+    of_runs = [asked_of(run, references, view) for run in runs]
     # What the localizer said was asked already, as the robot's own belief.
     rerun = [
         asked
@@ -95,9 +97,13 @@ def postmortem(
         )
         for run, asked in zip(runs, of_runs, strict=True)
     )
-    recorded = () if any(run.trial.estimator in RECORDED for run in runs) else _recorded(view)
-    everybody = [(run, CheckContext.of_run(run, references, view)) for run in recorded]
-    everybody += zip(runs, of_runs, strict=True)
+    recorded = _recorded(view)
+    everybody = [(run, asked_of(run, references, view)) for run in recorded]
+    everybody += [
+        (run, asked)
+        for run, asked in zip(runs, of_runs, strict=True)
+        if run.trial.estimator not in RECORDED
+    ]
     say("done", 1.0)
     return Postmortem(
         manifest=bundle.manifest,
@@ -121,10 +127,14 @@ def postmortem(
 
 
 def _recorded(view: BundleView) -> tuple[Run, ...]:
-    """The localizer of the log as runs: they are asked nothing, and keep its ledger."""
-    names = recorded_names(view)
-    runs = (Trial(view.manifest.bundle_id, name, 0) for name in names)
-    return tuple(Run(trial, ESTIMATORS.load(trial.estimator)().run(view, seed=0)) for trial in runs)
+    """The localizer of the log as runs, in its ledger what the log holds near each of its words."""
+    runs = []
+    for name in recorded_names(view):
+        estimate = ESTIMATORS.load(name)().run(view, seed=0)
+        told = tuple(with_subjects(one, view) for one in estimate.innovations)
+        trial = Trial(view.manifest.bundle_id, name, 0)
+        runs.append(Run(trial, replace(estimate, innovations=told)))
+    return tuple(runs)
 
 
 def _worst_first(findings: Sequence[Finding]) -> tuple[Finding, ...]:

@@ -19,6 +19,7 @@ from slamreplay.consistency.evidence.parts import HEADING, POSITION
 from slamreplay.estimators.amcl.cloud import cluster_of, moments
 from slamreplay.estimators.amcl.config import AmclConfig
 from slamreplay.estimators.amcl.filter import AmclFilter
+from slamreplay.estimators.amcl.heaps import published as published_by_amcl
 from slamreplay.geometry import se2
 from slamreplay.geometry.covariance import ANY_ANGLE, ros_from_planar
 from slamreplay.maps.grid import OccupancyGrid
@@ -206,10 +207,11 @@ def test_what_the_replayed_filter_publishes_is_judged_as_it_judges_itself():
     parted = amcl.particles.copy()
     parted[::3, 0] += 3.0
     for particles, clusters in ((amcl.particles, 1), (parted, 2)):
-        amcl._adopt(particles.copy(), amcl.weights)
-        said = [(amcl.mean_xyyaw, amcl.cov)] * len(T)
-        found = log([np.array(amcl.particles)] * len(T), said).belonging
-        assert amcl.clusters == clusters
+        told = published_by_amcl(np.ascontiguousarray(particles.T), amcl.weights)
+        found = log(
+            [np.array(particles)] * len(T), [(told.mean_xyyaw, told.cov)] * len(T)
+        ).belonging
+        assert told.clusters == clusters
         assert found.parted.all() == (clusters == 2)
 
 

@@ -139,6 +139,20 @@ def test_a_score_below_the_least_is_nothing():
     assert best_pose(BOUNDS, points, nowhere) is None
 
 
+@pytest.mark.parametrize(("first_nodes", "few"), [(0, 0.0), (0, 1.0)])
+def test_any_way_down_leads_to_the_optimum(monkeypatch, first_nodes, few):
+    points = scan_at(np.array([9.5, 6.5, -2.4]), spacing=0.4)
+    points[::2] *= 0.6
+    once = best_pose(BOUNDS, points, PoseWindow.whole(FIELD))
+    monkeypatch.setattr(branch_and_bound, "_FIRST_NODES", first_nodes)
+    monkeypatch.setattr(branch_and_bound, "_FEW", few)
+
+    again = best_pose(BOUNDS, points, PoseWindow.whole(FIELD))
+
+    assert again.score == once.score
+    assert again.nodes != once.nodes
+
+
 def test_most_poses_are_never_scored():
     points = scan_at(np.array([9.5, 6.5, -2.4]))
     found = best_pose(BOUNDS, points, PoseWindow.whole(FIELD))

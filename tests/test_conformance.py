@@ -1,5 +1,7 @@
 """Every registered estimator, perturbation and decoder keeps its contract: one line each."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 from rosbags.typesys import Stores, get_typestore
@@ -9,6 +11,7 @@ from slamreplay.ingest import DECODERS
 from slamreplay.perturb import PERTURBATIONS
 from slamreplay.testing import check_decoder, check_estimator, check_noise, check_perturbation
 from slamreplay.testing.decoders import check_payload
+from slamreplay.testing.matched import WorldNoise, noisy_bundle
 from slamreplay.testing.synthetic import synthetic_bundle
 
 #: Name, and by how much sampling noise lets its poses miss a moved map frame: m, rad.
@@ -19,6 +22,7 @@ ESTIMATOR_LINES = {
     "ekf_tuned": (1e-3, 1e-3),
     "pose_graph": (0.02, 0.01),
     "pose_graph_online": (0.02, 0.01),
+    "fiducial_grid": (1e-6, 1e-6),
     "recorded": (1e-6, 1e-6),
     "recorded_pose": (1e-6, 1e-6),
     "recorded_tf": (1e-6, 1e-6),
@@ -27,6 +31,14 @@ ESTIMATOR_LINES = {
 
 #: Those that close loops are shown a lap and a half.
 LAPS_S = {"pose_graph": 60.0, "pose_graph_online": 60.0}
+
+#: Worlds whose noise is that of an estimator, where tags and odometry are not as by default.
+WORLDS = {
+    "fiducial_grid": partial(
+        noisy_bundle,
+        noise=WorldNoise(range_m=0.005, range_per_m=0.02, bearing_rad=0.02, heading_rad=0.01),
+    ),
+}
 
 PERTURBATION_LINES = (
     "initial_pose",
@@ -680,7 +692,7 @@ def test_estimator(name):
 
 @pytest.mark.parametrize("name", list(ESTIMATORS))
 def test_estimators_covariance_follows_its_noise(name):
-    check_noise(ESTIMATORS.load(name)())
+    check_noise(ESTIMATORS.load(name)(), worlds=WORLDS.get(name, noisy_bundle))
 
 
 @pytest.mark.parametrize("name", PERTURBATION_LINES)

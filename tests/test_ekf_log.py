@@ -15,6 +15,7 @@ from slamreplay.geometry import se2
 from slamreplay.testing import edits
 from slamreplay.testing.estimators import estimate_bytes
 from slamreplay.testing.synthetic import START_NS, synthetic_bundle, true_path
+from slamreplay.testing.synthetic_rows import table_of, tf_rows
 
 TAGGED = synthetic_bundle(seconds=20.0, with_tags=True)
 NOBODY_SAID = synthetic_bundle(
@@ -188,3 +189,42 @@ def test_a_robot_at_rest_learns_nothing_from_looking_again():
     used = estimate.scalars["sightings_accepted"] + estimate.scalars["sightings_rejected"]
     assert used == len(set(seen))
     assert estimate.scalars["sightings_without_motion"] == len(seen) - len(set(seen)) > 0
+
+
+def with_fixes(bundle, sigma=0.05, every=20):
+    """A receiver that knows the map, its antenna off the base; every third fix is 20 m off."""
+    rng = np.random.default_rng(0)
+    t_s = np.arange(0.0, 20.0, 0.05 * every)
+    antenna = np.array([0.3, -0.2, 0.0])
+    at = se2.compose(true_path(t_s), antenna)
+    at[:, :2] += sigma * rng.standard_normal((len(t_s), 2))
+    at[3::3, 0] += 20.0
+    fixes = table_of(
+        "references", "/fix", t_s, kind="gnss", frame_id="map", child_frame_id="antenna",
+        position_xyz=np.column_stack([at[:, :2], np.zeros(len(at))]),
+        orientation_xyzw=np.full((len(at), 4), np.nan),
+        covariance=np.tile(np.diag([sigma**2] * 3 + [np.nan] * 3).ravel(), (len(at), 1)),
+    )  # fmt: skip
+    mount = tf_rows("base_link", "antenna", np.zeros(1), antenna[None], is_static=True)
+    whole = {name: [bundle.table(name), more] for name, more in
+             (("references", fixes), ("transforms", mount))}  # fmt: skip
+    view = bundle.view()
+    for name, tables in whole.items():
+        view = view.with_table(Table.concat(TABLES[name], tables))
+    return view
+
+
+def test_satellite_fixes_in_the_map_hold_the_pose_and_wild_ones_are_rejected():
+    blind = edits.without(TAGGED, "sightings")
+    estimate = Ekf().run(with_fixes(blind), seed=0)
+    plain = Ekf().run(blind.view(), seed=0)
+    (fixes,) = estimate.innovations
+
+    assert (fixes.source, fixes.axes, fixes.frame_id) == ("gnss", ("x m", "y m"), "map")
+    assert set(fixes.about) == {"/fix"}
+    assert estimate.scalars["fixes_rejected"] == 6 == (~fixes.accepted).sum()
+    assert estimate.scalars["fixes_accepted"] > 10
+    assert np.hypot(*error(estimate.track)[100:, :2].T).max() < 0.15
+    assert np.hypot(*error(plain.track)[100:, :2].T).max() > 0.18
+    assert (np.linalg.det(estimate.track.cov[100:, :2, :2])
+            < 0.1 * np.linalg.det(plain.track.cov[100:, :2, :2])).all()  # fmt: skip

@@ -5,9 +5,10 @@ import pytest
 
 from slamreplay.errors import MapError, UsageError
 from slamreplay.estimators.amcl import kernels
-from slamreplay.estimators.amcl.cloud import moments
+from slamreplay.estimators.amcl.cloud import histogram, moments
 from slamreplay.estimators.amcl.config import AmclConfig
 from slamreplay.estimators.amcl.filter import AmclFilter
+from slamreplay.estimators.amcl.heaps import cell_of, cluster_of_cells, published
 from slamreplay.geometry import se2
 from slamreplay.maps.grid import OccupancyGrid
 from slamreplay.maps.raycast import cast_rays
@@ -53,42 +54,6 @@ def drive(amcl: AmclFilter, start, steps: int):
     return true
 
 
-def test_move_equals_plain_numpy():
-    before, noise = particles(), np.random.default_rng(2).normal(size=(300, 3))
-    motion, sigma = np.array([0.3, 0.5, -0.2]), np.array([0.1, 0.05, 0.2])
-
-    after = before.copy()
-    kernels.move(after, motion, sigma, noise)
-
-    turn1, distance, turn2 = (motion - sigma * noise).T
-    heading = before[:, 2] + turn1
-    x = before[:, 0] + distance * np.cos(heading)
-    y = before[:, 1] + distance * np.sin(heading)
-    expected = np.column_stack([x, y, se2.wrap_angle(heading + turn2)])
-    np.testing.assert_allclose(after, expected, atol=1e-12)
-
-
-def test_likelihoods_equal_plain_numpy_in_a_turned_grid():
-    cloud, ends = particles(), np.random.default_rng(3).normal(0.0, 4.0, (50, 2))
-    scores = np.random.default_rng(4).random(ROOM.cells.shape).astype(np.float32)
-
-    got = kernels.likelihoods(
-        cloud,
-        np.ascontiguousarray(ends.T),
-        np.pad(scores, 1, constant_values=0.25),
-        ROOM.origin_xyyaw,
-        ROOM.resolution_m,
-    )
-
-    cell = ROOM.cell_of(se2.transform_points(cloud, np.broadcast_to(ends, (300, 50, 2))))
-    inside = ROOM.inside(cell)
-    cell[~inside] = 0
-    score = np.where(inside, scores[cell[..., 0], cell[..., 1]], 0.25)
-    assert inside.any()
-    assert not inside.all()
-    np.testing.assert_allclose(got, 1.0 + score.sum(axis=1), rtol=1e-6)
-
-
 @pytest.mark.parametrize("n", [1, 7, 1000])
 def test_systematic_draws_each_row_as_often_as_its_weight_says(n):
     weights = np.random.default_rng(5).random(40)
@@ -100,6 +65,16 @@ def test_systematic_draws_each_row_as_often_as_its_weight_says(n):
     assert counts.sum() == n
     assert (np.abs(counts - n * weights / weights.sum()) < 1.0 + 1e-9).all()
     assert not counts[[0, 17, 39]].any()
+
+
+def test_draw_takes_the_rows_of_systematic_resampling():
+    weights = np.random.default_rng(5).random(40)
+    cloud, out = np.random.default_rng(1).random((3, 40)), np.empty((3, 100))
+
+    kernels.draw(cloud, weights, 0.37, out)
+
+    rows = kernels.systematic(np.cumsum(weights), 0.37, 100)
+    np.testing.assert_array_equal(out, cloud[:, rows])
 
 
 def test_kld_size_follows_the_formula_of_fox():
@@ -130,20 +105,36 @@ def test_clusters_join_touching_cells_and_headings_across_pi():
     assert len(set(labels[1:].tolist())) == 3
 
 
+@pytest.mark.parametrize("spread_m", [0.3, 3.0, 300.0])
+def test_hashed_cells_and_clusters_are_those_of_sorted_ones(spread_m):
+    cloud = np.random.default_rng(6).normal(0.0, [spread_m, spread_m, 1.0], (700, 3))
+    cloud[:, 2] = se2.wrap_angle(cloud[:, 2])
+    distinct, bins = histogram(cloud)
+
+    cell = np.empty(len(cloud), dtype=np.int64)
+    keys = cell_of(np.ascontiguousarray(cloud.T), cell)
+    labels = cluster_of_cells(keys)[cell]
+
+    assert len(keys) == len(distinct)
+    assert len(np.unique(np.column_stack([cell, bins]), axis=0)) == len(keys)
+    pairs = np.unique(np.column_stack([labels, kernels.cluster_labels(distinct)[bins]]), axis=0)
+    assert len(pairs) == len(np.unique(labels)) == len(np.unique(pairs[:, 1]))
+
+
 def test_two_heaps_are_two_clusters_and_a_stray_particle_is_none():
     amcl = AmclFilter(AmclConfig(min_particles=100, max_particles=1000), ROOM, 3)
     amcl.initialise(in_room(2.0, 1.5, 0.1), np.diag([0.01, 0.01, 0.001]))
-    one = amcl.clusters
+    one = amcl.published.clusters
     heaps = amcl.particles.copy()
     heaps[:400, 0] += 4.0
     heaps[-1, 0] -= 4.0
-    amcl._adopt(heaps, amcl.weights)
+    said = published(np.ascontiguousarray(heaps.T), amcl.weights)
     rows = np.s_[400:-1]
 
-    assert (one, amcl.clusters) == (1, 2)
-    np.testing.assert_allclose(amcl.mean_xyyaw[:2], heaps[rows, :2].mean(axis=0), atol=1e-9)
+    assert (one, said.clusters) == (1, 2)
+    np.testing.assert_allclose(said.mean_xyyaw[:2], heaps[rows, :2].mean(axis=0), atol=1e-9)
     own = moments(heaps, amcl.weights)
-    np.testing.assert_allclose(own.cov, amcl.cov)
+    np.testing.assert_allclose(own.cov, said.cov)
     np.testing.assert_allclose(own.cov[:2, :2], np.cov(heaps[:, :2].T, bias=True))
     assert own.cov[0, 0] > 3.0 > 100 * moments(heaps[rows], amcl.weights[rows]).cov[0, 0]
 
@@ -155,7 +146,7 @@ def test_filter_tracks_from_a_start_half_a_metre_off():
 
     true = drive(amcl, start, 60)
 
-    error = se2.between(true, amcl.mean_xyyaw)
+    error = se2.between(true, amcl.published.mean_xyyaw)
     assert np.hypot(*error[:2]) < 0.15
     assert abs(error[2]) < 0.1
     assert np.sqrt(amcl.cov[0, 0] + amcl.cov[1, 1]) < 0.4
@@ -171,7 +162,7 @@ def test_filter_finds_itself_anywhere():
 
     true = drive(amcl, in_room(2.0, 1.5, 0.1), 60)
 
-    assert np.hypot(*se2.between(true, amcl.mean_xyyaw)[:2]) < 0.4
+    assert np.hypot(*se2.between(true, amcl.published.mean_xyyaw)[:2]) < 0.4
 
 
 def test_random_particles_come_back_when_the_likelihood_falls():
@@ -215,7 +206,7 @@ def test_covariance_of_headings_is_circular_and_finite():
     amcl.initialise([1.0, 2.0, np.pi], np.diag([0.0, 0.0, 0.04]))
 
     assert amcl.cov[2, 2] == pytest.approx(0.04, rel=0.1)
-    assert abs(se2.wrap_angle(amcl.mean_xyyaw[2] - np.pi)) < 0.02
+    assert abs(se2.wrap_angle(amcl.published.mean_xyyaw[2] - np.pi)) < 0.02
 
     amcl.initialise_globally()
     assert np.isfinite(amcl.cov).all()

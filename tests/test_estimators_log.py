@@ -8,7 +8,7 @@ from slamreplay.bundle.tables import Table
 from slamreplay.bundle.view import BundleView
 from slamreplay.errors import NotApplicableError
 from slamreplay.estimators import ESTIMATORS
-from slamreplay.estimators.amcl.estimator import Amcl
+from slamreplay.estimators.amcl.estimator import PARTICLES, RANDOM_SEED, Amcl
 from slamreplay.estimators.dead_reckoning import DeadReckoning
 from slamreplay.estimators.start import GLOBAL, OFFSET, ROTATE, starts
 from slamreplay.geometry import se2
@@ -39,6 +39,96 @@ def test_amcl_follows_the_robot_and_dead_reckoning_drifts_from_it():
     assert 0.1 < np.mean(amcl.diagnostics["updated"]) < 0.4
     assert (amcl.diagnostics["particles"] >= 500).all()
     assert (amcl.diagnostics["clusters"][50:] == 1).all()
+
+
+def test_the_ledger_of_amcl_says_what_each_scan_wanted_and_what_it_did():
+    amcl = Amcl().run(BUNDLE.view(), seed=1)
+    (scan,) = amcl.innovations
+    updated = amcl.diagnostics["updated"] == 1.0
+
+    assert (scan.source, scan.frame_id, scan.axes) == ("scan", "map", ("x m", "y m", "yaw rad"))
+    np.testing.assert_array_equal(scan.t_ns, amcl.track.t_ns[updated])
+    assert not scan.is_predicted
+    assert scan.accepted.all()
+    assert (scan.score > 0.9).all()
+    before = amcl.track.xyyaw[updated] - scan.moved
+    wanted = before + scan.residual  # where the scan alone fits best
+    off = wanted - true_path((scan.t_ns - START_NS) / 1e9)
+    assert np.median(np.hypot(off[:, 0], off[:, 1])) < 0.03
+    assert np.abs(se2.wrap_angle(off[:, 2])).max() < 0.02
+    assert scan.nis[0] < 16.0
+
+    ahead = Amcl().run(BUNDLE.view().with_setting(OFFSET, 0.3), seed=1).innovations[0]
+    back = scan.residual[0] - ahead.residual[0]
+    np.testing.assert_allclose(np.hypot(*back[:2]), 0.3, atol=0.05)
+    without = Amcl(judge_scans=False).run(BUNDLE.view(), seed=1)
+    assert without.innovations == ()
+    np.testing.assert_array_equal(without.track.xyyaw, amcl.track.xyyaw)
+
+
+def test_the_ledger_of_a_global_start_knows_no_prediction():
+    (scan,) = Amcl().run(NO_START.view(), seed=1).innovations
+
+    assert np.isnan(scan.residual[0]).all()
+    assert np.isnan(scan.moved[0]).all()
+    assert np.isfinite(scan.residual[1:]).all()
+
+
+def test_the_ledger_of_dead_reckoning_has_steps_and_no_residual():
+    dead = DeadReckoning().run(BUNDLE.view(), seed=1)
+    (steps,) = dead.innovations
+
+    assert (steps.source, steps.is_predicted) == ("odometry", False)
+    assert np.isnan(steps.residual).all()
+    np.testing.assert_allclose(
+        np.diff(dead.track.xyyaw[:, :2], axis=0), steps.moved[:, :2], atol=1e-12
+    )
+
+
+def test_parameters_say_where_amcl_starts_and_a_perturbation_moves_that():
+    pose = {"set_initial_pose": True, "initial_pose.x": 1.0, "initial_pose.y": -2.0}
+    told = Amcl.from_parameters({**pose, "update_min_d": 100.0, "update_min_a": 100.0})
+    log = synthetic_bundle(seconds=2.0, with_initial_pose=False)
+
+    track = told.run(log.view(), seed=1).track
+    moved = told.run(log.view().with_setting(OFFSET, 3.0), seed=1).track
+
+    np.testing.assert_allclose(track.xyyaw[0, :2], [1.0, -2.0], atol=0.5)
+    np.testing.assert_allclose(moved.xyyaw[0, :2] - track.xyyaw[0, :2], [3.0, 0.0], atol=0.5)
+
+
+def test_a_random_seed_of_the_parameters_replaces_that_of_the_trial():
+    fixed = Amcl.from_parameters({"random_seed": 5})
+    log = synthetic_bundle(seconds=2.0).view()
+
+    tracks = [e.run(log, seed=s).track.xyyaw for e, s in ((fixed, 1), (fixed, 2), (Amcl(), 5))]
+
+    np.testing.assert_array_equal(tracks[0], tracks[1])
+    np.testing.assert_array_equal(tracks[0], tracks[2])
+    other = fixed.run(log.with_setting(RANDOM_SEED, 1.0), seed=1).track.xyyaw
+    assert not np.array_equal(other, tracks[0])
+
+
+@pytest.mark.parametrize(("ratio", "most"), [(0.1, 200), (2.0, 4000)])
+def test_the_number_of_particles_is_a_setting(ratio, most):
+    log = synthetic_bundle(seconds=2.0).view().with_setting(PARTICLES, ratio)
+    particles = Amcl().run(log, seed=1).diagnostics["particles"]
+
+    assert particles.max() <= most
+    assert particles.min() >= most / 4
+
+
+@pytest.mark.parametrize("changed", [
+    {"laser_model_type": "likelihood_field_prob"},
+    {"laser_model_type": "beam"},
+    {"robot_model_type": "nav2_amcl::OmniMotionModel"},
+    {"resample_interval": 2},
+    {"laser_model_type": "likelihood_field_prob", "do_beamskip": True},
+])  # fmt: skip
+def test_every_model_follows_the_robot(changed):
+    amcl = Amcl.from_parameters(changed).run(TAGGED.view(), seed=1)
+
+    assert np.hypot(*error(amcl.track)[60:, :2].T).max() < 0.3
 
 
 def test_dead_reckoning_covers_its_own_error():

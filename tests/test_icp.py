@@ -12,7 +12,7 @@ from slamreplay.errors import NotApplicableError
 from slamreplay.geometry import se2
 from slamreplay.maps.grid import OccupancyGrid
 from slamreplay.maps.raycast import cast_rays
-from slamreplay.matching.icp import IcpSettings, _axes, _nearest, icp
+from slamreplay.matching.icp import IcpSettings, _axes, _nearest, _sum_up, icp
 from slamreplay.matching.line_target import line_target
 from slamreplay.matching.open3d_icp import icp_open3d
 from slamreplay.testing.synthetic import room_grid
@@ -208,6 +208,13 @@ def test_settings_are_heeded():
 
     assert (one.steps, one.converged) == (1, False)
     assert np.hypot(*(whole.xyyaw - move)[:2]) < 0.006
+
+
+def test_the_sums_are_compiled_once():
+    points = scan_at((3.7, 6.1, 0.7), np.random.default_rng(0))
+    icp(line_target(points), points, np.zeros(3))
+
+    assert len(_sum_up.signatures) == 1
 
 
 def test_open3d_finds_the_same_place():

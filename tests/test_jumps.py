@@ -13,8 +13,10 @@ from slamreplay.bundle.tables import Table
 from slamreplay.bundle.track import PoseTrack
 from slamreplay.consistency.belief.jumps.check import check
 from slamreplay.consistency.belief.jumps.found import jumps_of
+from slamreplay.consistency.belief.jumps.log_events import with_subjects
 from slamreplay.consistency.context import CheckContext
 from slamreplay.consistency.evidence.source import Reference
+from slamreplay.estimators.recorded import recorded_ledger
 from slamreplay.geometry import se2
 from slamreplay.geometry.times import ns
 from slamreplay.testing import edits, synthetic_bundle
@@ -130,6 +132,18 @@ def test_what_the_log_holds_near_a_recorded_jump_is_named(table, role, told):
     (jump,) = [j for j in jumps_of(asked(with_rows(JUMPING, table, role))) if j.step.is_grave]
 
     assert told in jump.cause
+
+
+def test_the_recorded_ledger_says_what_the_log_holds_at_the_word_it_moved_most():
+    view = with_rows(JUMPING, closure_at(3.7)).view()
+    told = with_subjects(recorded_ledger(view), view)
+
+    (row,) = np.flatnonzero(told.about != "")
+    assert told.t_ns[row] == START_NS + ns(AT_S)
+    assert told.about[row] == "loop closure node 803 -> node 17, score 0.61 0.3 s before"
+    assert (
+        with_subjects(recorded_ledger(JUMPING.view()), JUMPING.view()).about.tolist() == [""] * 16
+    )
 
 
 def test_a_tag_seen_after_a_while_is_news():

@@ -9,7 +9,7 @@ from slamreplay.maps.grid import OccupancyGrid
 from slamreplay.maps.raycast import cast_rays
 from slamreplay.matching.correlative import Window, climb, match, match_each, search_window
 from slamreplay.matching.field import ScoreField, points_field, working_map
-from slamreplay.matching.kernels import _derivatives
+from slamreplay.matching.kernels import _derivatives, match_jobs
 from slamreplay.matching.thinning import thin, thin_persistent
 from slamreplay.matching.whole_map import _score_lattice, search_map, search_space
 from slamreplay.testing.synthetic import room_grid
@@ -195,6 +195,21 @@ def test_one_cloud_is_matched_at_many_places():
         found.xyyaw.tolist()
     )
     assert match_each(field, [cloud], np.empty((0, 3)), None).score.shape == (0,)
+
+
+def test_one_compiled_kernel_serves_arrays_of_any_kind():
+    field = points_field(RNG.uniform(-2.0, 2.0, (200, 2)), 0.1)
+    cloud, centres = RNG.uniform(-2.0, 2.0, (50, 2)), RNG.normal(0.0, 0.1, (20, 3))
+    match_each(field, [cloud], centres, None)
+    compiled = len(match_jobs.signatures)
+
+    match_each(field, [cloud] * 20, np.asfortranarray(centres), Window(0.1, 0.1, 0.1, 0.1))
+    match_each(field, [cloud], centres[:1], None)
+    frozen = centres[1].copy()
+    frozen.setflags(write=False)
+    climb(field, cloud, frozen)
+
+    assert len(match_jobs.signatures) == compiled
 
 
 def test_climb_reaches_the_true_pose():

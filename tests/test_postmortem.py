@@ -110,7 +110,8 @@ def test_trials_are_measured_beside_each_other():
         track = PoseTrack.without_covariance(
             "map", "base_link", t, truth + np.array([0.6 * k, 0.0, 0.0])
         )
-        trial = Trial(bundle.manifest.bundle_id, "amcl", 0, perturbation, level, "s")
+        unit = "s" if perturbation else ""
+        trial = Trial(bundle.manifest.bundle_id, "amcl", 0, perturbation, level, unit)
         runs.append(Run(trial, Estimate(track)))
 
     content = json.loads(build(postmortem(bundle, runs)).json_text())["trials"]

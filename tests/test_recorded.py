@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from slamreplay.audit.log_audit import LogAudit
 from slamreplay.bundle.belief import recorded_belief
 from slamreplay.bundle.run import run_bytes
 from slamreplay.bundle.schema import TABLES
@@ -48,6 +49,15 @@ def test_each_word_moves_the_belief_by_what_it_jumped(jumping, estimator):
     assert not ledger.is_predicted
     assert np.isnan(ledger.residual).all()
     assert ledger.accepted.all()
+
+
+def test_it_moved_as_the_audit_of_tf_says(jumping):
+    (ledger,) = RecordedTf().run(jumping.view(), seed=0).innovations
+    steps = LogAudit(jumping.view()).corrections.at_robot
+
+    assert ledger.t_ns[1:].tolist() == steps.t_ns.tolist()
+    np.testing.assert_allclose(np.hypot(*ledger.moved[1:, :2].T), steps.metres, atol=1e-8)
+    np.testing.assert_allclose(np.abs(ledger.moved[1:, 2]), steps.radians, atol=1e-8)
 
 
 def test_its_rows_are_the_belief_at_the_scans(jumping):

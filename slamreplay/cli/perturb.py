@@ -60,8 +60,10 @@ _COLUMNS = (
     ("max [rad]", "baseline_max_rad"),
     ("rmse to ref. [m]", "reference_rmse_m"),
 )
+#: Shown only where any run has them.
+_ALIGNED = (("ATE aligned [m]", "ate_aligned_m"),)
+_NEES = (("mean NEES", "nees_mean"), ("by chance (95 %)", "nees_interval"))
 _RELATIONS = (("relations [m]", "relations_m"), ("relations [rad]", "relations_rad"))
-
 
 _FINE = {key for _, key in _RELATIONS}
 
@@ -115,12 +117,14 @@ def perturb(
     from slamreplay.bundle.atomic import check_target
     from slamreplay.cli.main import cache_folder
     from slamreplay.cli.progress import progress_bar
+    from slamreplay.consistency.evidence.references import references_of
     from slamreplay.estimators import ESTIMATORS
     from slamreplay.replay.design import design, parse_perturbation, usual_estimators
     from slamreplay.replay.folder import RUNS, write_runs
     from slamreplay.replay.metrics import trial_metrics
     from slamreplay.replay.parameters import Configuration, read_parameters
     from slamreplay.replay.runner import replay
+    from slamreplay.report.metrics import asked_of, nees_metrics
 
     check_target(output, RUNS)
     for text in perturbations or ():  # before minutes are spent on reading the log
@@ -146,6 +150,7 @@ def perturb(
             runs = replay(bundle, trials, progress=progress, cache=cache_folder() / "runs")
         is_raw = bundle.path is None or bundle.path.resolve() != logs[0].resolve()
         write_runs(output, bundle, runs, keep_bundle=is_raw)
+        view, references = bundle.view(), references_of(bundle, None)
         rows: list[dict[str, Any]] = [
             {
                 "estimator": run.trial.estimator,
@@ -154,7 +159,10 @@ def perturb(
                 "unit": run.trial.unit,
                 "parameters": run.trial.given,
                 "not_applicable": run.not_applicable,
-                "metrics": trial_metrics(run, runs, bundle),
+                "metrics": {
+                    **trial_metrics(run, runs, bundle),
+                    **nees_metrics(asked_of(run, references, view)),
+                },
             }
             for run in runs
         ]
@@ -170,8 +178,13 @@ def perturb(
 def _text(rows: list[dict[str, Any]]) -> str:
     """The trials as a table: every estimator's baseline, and below it what changes from it."""
     order = list(dict.fromkeys(str(row["estimator"]) for row in rows))
-    has_relations = any(row["metrics"]["relations_n"] for row in rows)
-    columns = (*_COLUMNS, *_RELATIONS) if has_relations else _COLUMNS
+    columns = list(_COLUMNS)
+    for group, key in (
+        (_ALIGNED, "ate_aligned_m"),
+        (_NEES, "nees_mean"),
+        (_RELATIONS, "relations_n"),
+    ):
+        columns += group if any(row["metrics"][key] for row in rows) else ()
     lines = [["estimator", "perturbation", "level", *(title for title, _ in columns)]]
     for row in sorted(rows, key=lambda row: order.index(str(row["estimator"]))):
         level = "" if row["level"] is None else f"{row['level']:g} {row['unit']}"
@@ -194,5 +207,8 @@ def _text(rows: list[dict[str, Any]]) -> str:
 
 
 def _number(metrics: Metrics, key: str) -> str:
+    if key == "nees_interval":
+        low, high = metrics["nees_low"], metrics["nees_high"]
+        return "-" if low is None or high is None else f"{low:.2f} to {high:.2f}"
     value = metrics[key]
     return "-" if value is None else f"{value:.4f}" if key in _FINE else f"{value:.3f}"

@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from slamreplay.bundle.run import Estimate
+from slamreplay.bundle.run import Estimate, Innovations
 from slamreplay.bundle.scans import scan_set
 from slamreplay.bundle.track import PoseTrack
 from slamreplay.bundle.view import BundleView
@@ -49,6 +49,9 @@ class DeadReckoning:
     def run(self, view: BundleView, *, seed: int) -> Estimate:  # noqa: ARG002 - nothing is random
         """One row per scan (per odometry sample without scans), NaN where odometry says nothing.
 
+        The ledger's source `odometry` says how far each step between rows moved the belief. It has
+        no residual: nothing was expected of a step, and nothing could be rejected.
+
         Raises:
             NotApplicableError: the log has no odometry.
         """
@@ -69,7 +72,7 @@ class DeadReckoning:
         if known.any():
             cov[known] = self._covariance(odometry, T_map_odom, t_ns[start.row], start, t_ns[known])
         child = view.manifest.frames.base or odometry.child_frame_id
-        return Estimate(PoseTrack(frame, child, t_ns, xyyaw, cov))
+        return Estimate(PoseTrack(frame, child, t_ns, xyyaw, cov), _steps(frame, t_ns, xyyaw))
 
     def _covariance(
         self,
@@ -111,6 +114,29 @@ class DeadReckoning:
         P += F @ start.cov @ np.swapaxes(F, 1, 2)
         P = (P + np.swapaxes(P, 1, 2)) / 2.0
         return np.asarray(P[np.searchsorted(t, at_ns)])
+
+
+def _steps(frame: str, t_ns: np.ndarray, xyyaw: se2.Array) -> tuple[Innovations, ...]:
+    """The ledger of poses (N, 3): a row for each that has a pose before it."""
+    known = np.flatnonzero(np.isfinite(xyyaw).all(axis=1))
+    if len(known) < 2:
+        return ()
+    moved = np.diff(xyyaw[known], axis=0)
+    moved[:, 2] = se2.wrap_angle(moved[:, 2])
+    n = len(moved)
+    return (
+        Innovations(
+            "odometry",
+            t_ns[known[1:]],
+            np.full((n, 3), np.nan),
+            np.full((n, 3, 3), np.nan),
+            np.ones(n, dtype=bool),
+            ("x m", "y m", "yaw rad"),
+            frame,
+            moved,
+            is_predicted=False,
+        ),
+    )
 
 
 def _zero(T_odom_base: se2.Array) -> Start:

@@ -13,5 +13,6 @@ LABS = Registry(
         "interval_calibration": "slamreplay.labs.interval_calibration.lab:IntervalCalibration",
         "joint_estimation": "slamreplay.labs.joint_estimation.lab:JointEstimation",
         "two_run": "slamreplay.labs.two_run.lab:TwoRun",
+        "wheel_slip": "slamreplay.labs.wheel_slip.lab:WheelSlip",
     },
 )

@@ -21,8 +21,9 @@ from slamreplay.matching.field import ScoreField
 from slamreplay.matching.pyramid import BYTE, LEVELS, LONGEST_RUN, SPREADS, Pyramid
 from slamreplay.matching.threads import share_out
 
-#: So many coarsest nodes are worth adding up together, and no more than this many are.
-_WORTH_ADDING, _MOST_NODES = 64, 500_000
+#: So many coarsest nodes are worth adding up together. At first there are about so many at most,
+#: and if more than a share of them is left, up to so many more on a finer level.
+_WORTH_ADDING, _FIRST_NODES, _FEW, _MOST_NODES = 64, 500_000, 0.02, 20_000_000
 #: The least coarse of the coarsest levels: one square less costs more runs than it spares nodes.
 _LEAST_LEVEL = 3
 #: Coarsest nodes are shared out to threads from here on.
@@ -99,21 +100,37 @@ def best_pose(
     lattice = _lattice(field, points, window, step_rad)
     search = _search(bounds, lattice)
     best = np.array([min_score * len(points), -1.0, -1.0, -1.0, 0.0])
-    tops = _bound_tops(bounds, search)
-    # A good pose found early prunes the rest: one node of each run of headings comes first.
-    first = tops.reshape(len(tops), -1).argmax(axis=1) + np.arange(len(tops)) * tops[0].size
-    flat = tops.reshape(-1)
-    for nodes in (first, None):
-        if nodes is None:
-            flat[first] = 0
-            nodes = np.flatnonzero(flat > best[0] * BYTE)
-        nodes = nodes[np.argsort(-flat[nodes], kind="stable")]
-        _descend(field.values, bounds.bounds, search, nodes, flat[nodes], best)
+    level = int(search[1][6])
+    while True:
+        tops = _bound_tops(bounds, search, level)
+        # A good pose found early prunes the rest: the best node of each run comes first.
+        flat = tops.reshape(-1)
+        first = tops.reshape(len(tops), -1).argmax(axis=1) + np.arange(len(tops)) * tops[0].size
+        _visit(bounds, search, level, flat, first, best)
+        flat[first] = 0
+        left = np.flatnonzero(flat > best[0] * BYTE)
+        # Where much is left, as in a cloud that half fits, adding up finer nodes costs less.
+        if len(left) < _FEW * len(flat) or level == _LEAST_LEVEL or 8 * len(flat) > _MOST_NODES:
+            break
+        level -= 1
+    _visit(bounds, search, level, flat, left, best)
     if best[3] < 0.0:
         return None
     xy = lattice.corner_xy + best[[2, 1]] * field.resolution_m
     yaw = se2.wrap_angle(lattice.headings[int(best[3])])
     return Optimum(np.append(xy, yaw), float(best[0] / len(points)), int(best[4]))
+
+
+def _visit(
+    bounds: Pyramid,
+    search: tuple[NDArray, ...],
+    level: int,
+    tops: NDArray[np.int32],
+    nodes: NDArray[np.int64],
+    best: se2.Array,
+) -> None:
+    nodes = nodes[np.argsort(-tops[nodes], kind="stable")]
+    _descend(bounds.field.values, bounds.bounds, search, level, nodes, tops[nodes], best)
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,7 +183,7 @@ def _search(bounds: Pyramid, lattice: _Lattice) -> tuple[NDArray, ...]:
     rows, cols = lattice.shape
     headings, points = lattice.cells.shape[:2]
     level = _LEAST_LEVEL
-    while (rows >> level) * (cols >> level) * headings // lattice.longest_run > _MOST_NODES:
+    while (rows >> level) * (cols >> level) * headings // lattice.longest_run > _FIRST_NODES:
         if level == LEVELS:
             break
         level += 1
@@ -183,19 +200,19 @@ def _search(bounds: Pyramid, lattice: _Lattice) -> tuple[NDArray, ...]:
     return lattice.cells, shape, starts, where, ranges
 
 
-def _bound_tops(bounds: Pyramid, search: tuple[NDArray, ...]) -> NDArray[np.int32]:
-    """(runs, rows, columns) bounds of the coarsest nodes, in `BYTE`s of score."""
+def _bound_tops(bounds: Pyramid, search: tuple[NDArray, ...], level: int) -> NDArray[np.int32]:
+    """(runs, rows, columns) bounds of all nodes of a level, in `BYTE`s of score."""
     shape, starts = search[1], search[2]
-    square = 1 << int(shape[6])
+    square = 1 << level
     rows, cols = -(-int(shape[0]) // square), -(-int(shape[1]) // square)
-    runs = int(starts[-1] - starts[-2])
+    runs = int(starts[level + 1] - starts[level])
     tops = np.zeros((runs, rows, cols), dtype=np.int32)
     width = int(shape[5]) // square
     worth = rows * cols >= _WORTH_ADDING and cols <= width
 
     def work(first: int, stop: int) -> None:
         total = np.zeros(rows * width if worth else 0, dtype=np.uint16)
-        _add_tables(bounds.bounds, search, first, stop, total, tops)
+        _add_tables(bounds.bounds, search, level, first, stop, total, tops)
 
     share_out(runs, work, _WORTH_A_THREAD)
     return tops
@@ -257,14 +274,13 @@ def _locate(search, level, run):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def _add_tables(bounds, search, first, stop, total, tops):  # type: ignore[no-untyped-def]  # noqa: C901
-    """Bound the coarsest nodes of the runs from `first` to before `stop`.
+def _add_tables(bounds, search, level, first, stop, total, tops):  # type: ignore[no-untyped-def]  # noqa: C901
+    """Bound a level's nodes of the runs from `first` to before `stop`.
 
     A table is added as one line: the nodes of a row that look past its end find the next row, which
     makes their bound no smaller than it should be.
     """
     shape, where = search[1], search[3]
-    level = shape[6]
     height, width = shape[4] >> level, shape[5] >> level
     rows, cols = tops.shape[1], tops.shape[2]
     length, count = total.shape[0], where.shape[1]
@@ -362,20 +378,21 @@ def _score_four(values, search, heading, i, j, best):  # type: ignore[no-untyped
 
 
 @njit(cache=True, nogil=True)
-def _descend(values, bounds, search, nodes, tops, best):  # type: ignore[no-untyped-def]  # noqa: C901
-    """Go down from coarsest nodes, the most promising child first, and keep the best pose.
+def _descend(values, bounds, search, top, nodes, tops, best):  # type: ignore[no-untyped-def]  # noqa: C901
+    """Go down from nodes, the most promising child first, and keep the best pose.
 
     Args:
         values: (H, W) of the field.
         bounds: of the pyramid.
         search: lattice and room.
-        nodes: (M,) flat numbers of coarsest nodes.
+        top: their level.
+        nodes: (M,) their numbers, flat over runs, rows and columns.
         tops: (M,) their bounds.
         best: summed score, row, column, heading, nodes bounded; kept up to date.
     """
     shape = search[1]
     longest = shape[7]
-    square = 1 << shape[6]
+    square = 1 << top
     rows, cols = (shape[0] + square - 1) // square, (shape[1] + square - 1) // square
     stack = np.empty((8 * LEVELS + 1, 5), dtype=np.int64)
     four = np.zeros(4, dtype=np.int64)
@@ -383,7 +400,7 @@ def _descend(values, bounds, search, nodes, tops, best):  # type: ignore[no-unty
         if tops[n] <= best[0] * BYTE:
             continue
         node = nodes[n]
-        stack[0, 0], stack[0, 1], stack[0, 2] = shape[6], node // (rows * cols), node // cols % rows
+        stack[0, 0], stack[0, 1], stack[0, 2] = top, node // (rows * cols), node // cols % rows
         stack[0, 3], stack[0, 4] = node % cols, tops[n]
         depth = 1
         while depth > 0:

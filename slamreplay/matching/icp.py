@@ -159,9 +159,12 @@ def _register(target, count, frame, points, pose, limits, partner, out, room, ta
                 tally[3] = 1.0
                 break
             stride = 1
+    every = np.int64(1)  # a plain 1 would have the sums compiled once more, for it alone
     # Of where the pose is: weights by a width that goes with the fit, whatever it was before.
     for _ in range(20):
-        rms = _sum_up(target, frame, points, pose, limits[0], width, 1, lever, partner, out, tally)
+        rms = _sum_up(
+            target, frame, points, pose, limits[0], width, every, lever, partner, out, tally
+        )
         narrow = max(min(width, 2.5 * rms), 2.5 * noise)
         if narrow > 0.8 * width:
             break
@@ -176,7 +179,7 @@ def _register(target, count, frame, points, pose, limits, partner, out, room, ta
             trust[partner[p]] += 1.0
     for q in range(trust.shape[0]):
         trust[q] = 1.0 / (1.0 + trust[q] / count[q])
-    _sum_up(target, frame, points, pose, limits[0], width, 1, lever, partner, out, tally)
+    _sum_up(target, frame, points, pose, limits[0], width, every, lever, partner, out, tally)
     _axes(out, room, limits[4])
     tally[1] = rms
     variance = max(tally[1], noise) ** 2

@@ -10,6 +10,7 @@ import ctypes
 from dataclasses import replace
 from typing import Any
 
+import numba
 import numpy as np
 
 from slamreplay.errors import NotApplicableError
@@ -60,7 +61,12 @@ def _registered(
 
 
 def _open3d() -> Any:
-    """Open3D, which wants libusb even where there is no device: the wheel of it will do."""
+    """Open3D, which wants libusb even where there is no device: the wheel of it will do.
+
+    It brings a TBB that is too old for numba, which warns of it when it first looks at its threads
+    and finds that loaded; so it looks now.
+    """
+    numba.get_num_threads()
     try:
         import libusb_package
 

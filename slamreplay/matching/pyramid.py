@@ -21,7 +21,7 @@ LEVELS = 5
 #: The longest run of headings that is bounded at once.
 LONGEST_RUN = 8
 #: How far points move in a run, in cells: each has tables of its own.
-SPREADS = (0, 1, 2, 4, 8)
+SPREADS = (2, 4, 8)
 #: Scores are kept as bytes, rounded up, so that they stay bounds.
 BYTE = 255
 
@@ -48,7 +48,7 @@ class Pyramid:
 
 
 def pyramid(field: ScoreField) -> Pyramid:
-    """The bounds of a field, 25 bytes a cell; making them costs about what one search costs."""
+    """The bounds of a field, 15 bytes a cell; making them costs about what one search costs."""
     largest = 1 << LEVELS
     margin = 2 * largest
     height, width = (-(-(n + margin) // largest) * largest for n in field.values.shape)

@@ -12,8 +12,12 @@ from slamreplay.bundle.schema import JUDGING_KINDS
 from slamreplay.bundle.track import PoseTrack
 from slamreplay.bundle.view import Bundle
 from slamreplay.geometry import se2, se3
+from slamreplay.geometry.alignment import least_squares
 from slamreplay.geometry.covariance import planar_from_ros
 from slamreplay.replay.relations import relation_metrics
+
+#: Fewer are laid onto anything.
+_LEAST_POSITIONS = 3
 
 Metrics = dict[str, float | None]
 
@@ -33,13 +37,16 @@ def trial_metrics(run: Run, runs: Sequence[Run], bundle: Bundle) -> Metrics:
     `rows` and `rows_with_pose`; `baseline_median_m`, `baseline_max_m`, `baseline_final_m` and
     `baseline_max_rad`: distance to the baseline at the same times; `reference_rmse_m`,
     `reference_max_m`, `reference_max_rad`: distance to a judging reference in the same frame,
-    nothing aligned; `relations_*` as in `replay.relations`.
+    nothing aligned; `ate_aligned_m`: of positions, after laying the whole path rigidly onto the
+    reference, whose frame may be its own (see `ate_aligned`); `relations_*` as in
+    `replay.relations`.
     """
     track = None if run.estimate is None else run.estimate.track
     baseline = baseline_of(run, runs)
     beside = None if baseline is None or baseline.estimate is None else baseline.estimate.track
     to_baseline = _difference(track, beside)
-    to_reference = _difference(track, judging_reference(bundle))
+    reference = judging_reference(bundle)
+    to_reference = _difference(track, reference)
     distance, turn = np.hypot(to_baseline[:, 0], to_baseline[:, 1]), np.abs(to_baseline[:, 2])
     error = np.hypot(to_reference[:, 0], to_reference[:, 1])
     return {
@@ -52,6 +59,7 @@ def trial_metrics(run: Run, runs: Sequence[Run], bundle: Bundle) -> Metrics:
         "reference_rmse_m": float(np.sqrt(np.mean(error**2))) if len(error) else None,
         "reference_max_m": float(error.max()) if len(error) else None,
         "reference_max_rad": float(np.abs(to_reference[:, 2]).max()) if len(error) else None,
+        "ate_aligned_m": ate_aligned(track, reference),
         **relation_metrics(track, bundle),
     }
 
@@ -68,6 +76,31 @@ def judging_reference(bundle: Bundle) -> PoseTrack | None:
     cov = planar_from_ros(table["covariance"])
     frame, child = str(table["frame_id"][0]), str(table["child_frame_id"][0])
     return PoseTrack(frame, child, table.t_ns, xyyaw, cov)
+
+
+def ate_aligned(track: PoseTrack | None, reference: PoseTrack | None) -> float | None:
+    """Absolute trajectory error in m: rms distance of positions, the path rigidly laid on first.
+
+    As the TUM benchmark has it (Sturm et al., IROS 2012) and evo prints it with `--align`. It tells
+    the shape of a path apart from the frame it is in, and says nothing of a covariance: an
+    alignment eats the error that NEES is about. None below three common positions.
+
+    Args:
+        track: the path.
+        reference: in any frame; it is interpolated at the path's times.
+    """
+    if track is None or reference is None:
+        return None
+    # A reference of positions alone has them interpolated all the same.
+    xyyaw = np.column_stack([reference.xyyaw[:, :2], np.nan_to_num(reference.xyyaw[:, 2])])
+    placed = replace(reference, xyyaw=xyyaw)
+    onto, points = placed.at(track.t_ns).xyyaw[:, :2], track.xyyaw[:, :2]
+    both = np.isfinite(onto).all(axis=1) & np.isfinite(points).all(axis=1)
+    if both.sum() < _LEAST_POSITIONS:
+        return None
+    points, onto = points[both], onto[both]
+    apart = se2.transform_points(least_squares(points, onto), points) - onto
+    return float(np.sqrt(np.mean(np.sum(apart**2, axis=1))))
 
 
 def _difference(track: PoseTrack | None, other: PoseTrack | None) -> se2.Array:

@@ -31,7 +31,7 @@ def means(summaries: Summaries) -> Table:
         )
         for summary, part in _rows(summaries)
     ]
-    return table(head, rows)
+    return table(head, rows, more_in="")
 
 
 def coverage(summaries: Summaries) -> Table:
@@ -53,7 +53,7 @@ def coverage(summaries: Summaries) -> Table:
                 NOT_KNOWN if index is None else number(index.inclination, "+.1f", "dB"),
             )
         )
-    return table(head, rows)
+    return table(head, rows, more_in="")
 
 
 def note(summaries: Summaries) -> str:

@@ -17,6 +17,7 @@ from slamreplay.bundle.track import PoseTrack
 from slamreplay.consistency.belief.jumps.found import Jump
 from slamreplay.consistency.belief.summary import ConsistencySummary
 from slamreplay.consistency.evidence.nees import Nees
+from slamreplay.estimators import RECORDED
 from slamreplay.geometry import se2
 from slamreplay.geometry.times import seconds_since
 from slamreplay.maps.grid import OccupancyGrid
@@ -54,7 +55,7 @@ class Postmortem:
         nees: of the belief at its own updates, None without covariance or reference.
         consistency: the belief's covariance against every source that can tell, the best first.
         trials: perturbation trials, baseline first.
-        recorded: the localizer of the log as runs, where the trials have none of it.
+        recorded: the localizer of the log as runs, its ledger with what the log holds near it.
         jumps: of each run, the recorded ones first, the steps of its path and their causes.
         trace_ns: the moment around which is asked what moved the belief, None if nobody asked.
         reliability: how often what was said with a confidence was right, as measured.
@@ -86,14 +87,19 @@ class Postmortem:
     @cached_property
     def ledger(self) -> tuple[LedgerSet, ...]:
         """What every measurement of every run did, the recorded localizer first."""
-        return ledger_sets([*self.recorded, *(result.run for result in self.trials)])
+        return ledger_sets(self._kept)
 
     @cached_property
     def traces(self) -> tuple[RunTrace, ...]:
         """What moved the belief of each run around the moment that was asked for."""
         if self.trace_ns is None:
             return ()
-        return trace([*self.recorded, *(result.run for result in self.trials)], self.trace_ns)
+        return trace(self._kept, self.trace_ns)
+
+    @property
+    def _kept(self) -> list[Run]:
+        rerun = [t.run for t in self.trials if t.run.trial.estimator not in RECORDED]
+        return [*self.recorded, *rerun]
 
     @property
     def drawn_from_ns(self) -> int:

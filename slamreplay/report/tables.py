@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,6 +24,7 @@ _COLUMNS = {
     "hindsight_max_m": "max error [m]",
     "lost_share": "share lost [1]",
     "baseline_max_m": "from baseline [m]",
+    "ate_aligned_m": "rms error, rigidly aligned [m]",
     "nees_mean": "mean NEES [1]",
 }
 
@@ -54,12 +55,15 @@ class Table:
 def table(
     head: tuple[str, ...], rows: Sequence[Sequence[str | Cell]], more_in: str = "report.json"
 ) -> Table:
-    """A table of the first rows; the rest is counted, and named the file that has it."""
+    """A table of the first rows; the rest is counted, and named the file that has it.
+
+    Nothing is left out of a table that no file has: `more_in` is empty then.
+    """
+    most = MOST_ROWS if more_in else len(rows)
     shown = tuple(
-        tuple(cell if isinstance(cell, Cell) else Cell(cell) for cell in row)
-        for row in rows[:MOST_ROWS]
+        tuple(cell if isinstance(cell, Cell) else Cell(cell) for cell in row) for row in rows[:most]
     )
-    return Table(head, shown, max(0, len(rows) - MOST_ROWS), more_in)
+    return Table(head, shown, len(rows) - len(shown), more_in)
 
 
 def intervals(post: Postmortem) -> Table:
@@ -156,6 +160,12 @@ def regions(post: Postmortem) -> Table:
     )
 
 
+def _interval(metrics: Mapping[str, float | None]) -> str:
+    """Where the mean NEES of consistent ones lies in 95 of 100 logs."""
+    low, high = metrics.get("nees_low"), metrics.get("nees_high")
+    return "" if low is None or high is None else f"chance: {short(low)} to {short(high)}"
+
+
 def trials(post: Postmortem) -> Table:
     """A row per trial, a column per metric; each perturbed number stands beside its baseline."""
     names = [name for name in _COLUMNS if any(t.metrics.get(name) is not None for t in post.trials)]
@@ -181,6 +191,8 @@ def trials(post: Postmortem) -> Table:
         for name in names:
             beside = base.get(name) if name != "baseline_max_m" else None
             aside = "" if beside is None else f"baseline {short(beside)}"
+            if name == "nees_mean":
+                aside = "; ".join(text for text in (_interval(result.metrics), aside) if text)
             cells.append(Cell(short(result.metrics.get(name)), aside))
         if result.run.estimate is None:
             cells[3:] = [Cell("not applicable", result.run.not_applicable or "")]

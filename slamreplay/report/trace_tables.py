@@ -43,11 +43,11 @@ def trace_note(post: Postmortem) -> str:
     when = seconds(post.trace_ns - post.manifest.start_ns)
     if not post.traces:
         return f"No run has a ledger that could tell what moved the belief around {when}."
-    return (
-        f"Measurements within 5 s of {when}, those that moved the belief most first. What a "
-        f"recorded localizer measured nobody recorded: only how far each of its words moved it. "
-        f"{LEDGER_FILE} has every row."
-    )
+    text = f"Measurements within 5 s of {when}, those that moved the belief most first. "
+    if post.recorded:
+        text += "What a recorded localizer measured nobody recorded: only how far each of its "
+        text += "words moved it. "
+    return f"{text}{LEDGER_FILE} has every row."
 
 
 def _title(one: RunTrace) -> str:
@@ -56,9 +56,11 @@ def _title(one: RunTrace) -> str:
 
 
 def _rows(post: Postmortem, one: RunTrace) -> Table:
-    rows = [_row(post, traced) for traced in one.rows[:_SHOWN]]
-    shown = table(_HEAD, rows)
-    return Table(shown.head, shown.rows, max(0, len(one.rows) - _SHOWN), LEDGER_FILE)
+    shown = table(_HEAD, [_row(post, traced) for traced in one.rows[:_SHOWN]])
+    columns = zip(shown.head, *shown.rows, strict=True)
+    told = [column for column in columns if {cell.text for cell in column[1:]} != {NOT_KNOWN}]
+    head, *rows = zip(*told, strict=True)
+    return Table(head, tuple(rows), max(0, len(one.rows) - _SHOWN), LEDGER_FILE)
 
 
 def _row(post: Postmortem, one: Traced) -> tuple[str | Cell, ...]:
@@ -69,10 +71,11 @@ def _row(post: Postmortem, one: Traced) -> tuple[str | Cell, ...]:
     residual = [float(r) for r in seen.residual[one.row]]
     names = names if len(names) == len(residual) else [""] * len(residual)
     units = units if len(units) == len(residual) else [""] * len(residual)
-    score = float(seen.score[one.row])
+    score, about = float(seen.score[one.row]), str(seen.about[one.row])
+    what = about if about.startswith(seen.source) else f"{seen.source}: {about}".removesuffix(": ")
     return (
         seconds(one.t_ns - post.manifest.start_ns),
-        Cell(f"{seen.source} {seen.about[one.row]}".strip(), seen.frame_id),
+        Cell(what, seen.frame_id),
         _moved(one.metres, one.radians),
         _numbers(residual, names, units),
         _numbers(list(one.sigma), [""] * len(residual), units),

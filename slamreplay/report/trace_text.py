@@ -21,7 +21,8 @@ def trace_lines(post: Postmortem) -> Iterator[str]:
         for jump in grave[:_JUMPS]:
             yield f"{run_name(trial)} jumped {sentence(jump, post.manifest.start_ns)}"
         if len(grave) > _JUMPS:
-            yield f"{run_name(trial)} jumped {len(grave) - _JUMPS} times more"
+            more = len(grave) - _JUMPS
+            yield f"{run_name(trial)} jumped {more} more time{'s' if more > 1 else ''} as far"
     if post.trace_ns is not None:
         yield trace_note(post)
         for name, rows in traces(post):

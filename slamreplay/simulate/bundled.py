@@ -13,7 +13,7 @@ from slamreplay.simulate.topics import records
 from slamreplay.simulate.writer import write_log
 
 
-def bundle_of(recording: Recording, name: str = "simulated") -> Bundle:
+def bundle_of(recording: Recording, name: str = "simulated", suffix: str = ".mcap") -> Bundle:
     """The log of a recording, read as any other log.
 
     The log is really written and really ingested, in a folder that is gone afterwards: roles,
@@ -21,10 +21,11 @@ def bundle_of(recording: Recording, name: str = "simulated") -> Bundle:
 
     Args:
         recording: what was simulated.
-        name: of the log's file, without its suffix; the manifest tells it as the source.
+        name: of the log's file; the manifest tells it as the source.
+        suffix: the kind of log, one of those that the simulator writes.
     """
     with TemporaryDirectory(prefix="slamreplay-") as folder:
-        log = Path(folder) / f"{name}.mcap"
+        log = Path(folder) / f"{name}{suffix}"
         write_log(log, lambda messages: records(recording, messages))
         on_disk = ingest([log], Path(folder) / "bundle")
         tables = {name: on_disk.table(name) for name in TABLES}

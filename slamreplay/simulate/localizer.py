@@ -1,4 +1,4 @@
-"""The localizer on board: the same AMCL that replays logs, fed live."""
+"""The localizer on board: AMCL, fed live."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slamreplay.estimators.amcl.config import AmclConfig
-from slamreplay.estimators.amcl.filter import AmclFilter
 from slamreplay.geometry import se2
 from slamreplay.maps.grid import OccupancyGrid
+from slamreplay.simulate.onboard import OnboardFilter
 from slamreplay.simulate.sensors import XYYAW_BASE_LASER, Lidar, Odometry, Scans
 
 
@@ -41,7 +41,7 @@ def localize(
     config: AmclConfig,
 ) -> Beliefs:
     """Run AMCL over all scans from a start pose (3,) with covariance (3, 3)."""
-    amcl = AmclFilter(config, grid, seed)
+    amcl = OnboardFilter(config, grid, seed)
     amcl.initialise(*start)
     base = odometry_at(odometry, scans.t_s)
     n = len(scans.t_s)

@@ -32,7 +32,7 @@ def updates_of(
 
     Of the robot's own localizer those it published with a covariance, else the clouds of its
     particles, else those at which the covariance changed; of an estimator those it marks as
-    `updated`.
+    `updated`, and where it took nothing in all at which the covariance changed.
     """
     if not subject:
         published = published_belief(view) or cloud_belief(view)
@@ -40,8 +40,9 @@ def updates_of(
             return published
     if belief is None:
         return None
-    if "updated" in diagnostics:
-        belief = belief.take(diagnostics["updated"] > 0.0)
+    updated = diagnostics.get("updated")
+    if updated is not None and (updated > 0.0).any():
+        belief = belief.take(updated > 0.0)
     fresh = fresh_rows(belief)
     order = np.argsort(fresh.t_ns, kind="stable")
     return fresh.take(order) if len(fresh) else None

@@ -3,39 +3,42 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from typing import ClassVar, Self
 
 import numpy as np
 
 from slamreplay.bundle.run import Estimate
 from slamreplay.bundle.scans import ScanSet
-from slamreplay.bundle.track import PoseTrack
 from slamreplay.bundle.view import BundleView
-from slamreplay.errors import NotApplicableError
 from slamreplay.estimators.amcl.config import AmclConfig
 from slamreplay.estimators.amcl.filter import AmclFilter
 from slamreplay.estimators.amcl.laser import Beams, used_beams
+from slamreplay.estimators.amcl.ledger import Ledger
+from slamreplay.estimators.amcl.match import ScanMatcher
 from slamreplay.estimators.amcl.parameters import LIVE, NAMES, config_from
 from slamreplay.estimators.amcl.scan_quantile import ScanQuantile
 from slamreplay.estimators.inputs import need_grid, need_odometry, need_scans
 from slamreplay.estimators.start import DEFAULT_COV, GLOBAL, OFFSET, ROTATE, Start, starts
-from slamreplay.geometry import se2
 
-_DIAGNOSTICS = ("updated", "particles", "ess", "clusters", "likelihood_quantile")
+#: Settings a perturbation may change: a ratio of both particle numbers, and a number that makes
+#: every random one another.
+PARTICLES, RANDOM_SEED = "particle_count", "random_seed"
 
 
 @dataclass(frozen=True)
 class Amcl:
     """Run the particle filter on every scan, from where the robot's own localizer started.
 
-    It starts from the initial pose in the log, else from the first recorded belief, else anywhere;
-    every later initial pose starts it again. Between updates the pose is carried by odometry, as
-    tf does it, and the covariance stays the published one.
+    It starts from the initial pose in the log, else from that of the parameters, else from the
+    first recorded belief, else anywhere; every later initial pose starts it again. Between updates
+    the pose is carried by odometry, as tf does it, and the covariance stays the published one.
 
     Attributes:
-        config: nav2_amcl's parameters.
-        judge_scans: whether `likelihood_quantile` is measured; the estimate is the same without.
+        config: parameters of nav2_amcl or of ROS 1's amcl.
+        judge_scans: whether `likelihood_quantile` is measured and scans are matched for the ledger;
+            the estimate is the same without.
     """
 
     config: AmclConfig = field(default_factory=AmclConfig)
@@ -45,7 +48,7 @@ class Amcl:
     live_parameters: ClassVar[tuple[str, ...]] = LIVE
     name: ClassVar[str] = "amcl"
     needs: ClassVar[frozenset[str]] = frozenset({"odometry", "scans", "map"})
-    settings: ClassVar[frozenset[str]] = frozenset({OFFSET, ROTATE, GLOBAL})
+    settings: ClassVar[frozenset[str]] = frozenset({OFFSET, ROTATE, GLOBAL, PARTICLES, RANDOM_SEED})
     without_noise: ClassVar[str] = (
         "a likelihood field is no model of ranges, so that no world has the noise it takes"
     )
@@ -68,68 +71,73 @@ class Amcl:
         updates `likelihood_quantile`, the rank from 0 to 1 of the scan's likelihood among scans
         drawn from the filter's own prediction.
 
+        The ledger's source `scan` has a row per update: where the scan alone fits best, less the
+        pose that odometry carried there; S is the covariance of the predicted particles and that
+        of the match. A particle filter predicts no such S itself: it is for the ledger only.
+
         Raises:
             NotApplicableError: no odometry, scans or map.
         """
-        if self.config.laser_model_type != "likelihood_field":
-            raise NotApplicableError("only runs with laser_model_type likelihood_field yet")
-        if self.config.motion_model != "differential" or self.config.squared_motion_noise:
-            raise NotApplicableError("only runs with nav2_amcl's differential model yet")
         scans = need_scans(view, self.name)
         odometry = need_odometry(view, self.name)
         grid = need_grid(view, self.name)
+        config, seeds = self._perturbed(view, seed)
         T_odom_base = odometry.at(scans.t_ns).xyyaw
         known = np.flatnonzero(np.isfinite(T_odom_base).all(axis=1))
-        told = self.config.initial_pose
+        told = config.initial_pose
         given = {start.row: start for start in starts(view, scans.t_ns, T_odom_base, told)}
         if not given and len(known):
             given = {int(known[0]): Start(int(known[0]), None, DEFAULT_COV)}
-        amcl = AmclFilter(self.config, grid, seed)
-        quantile = ScanQuantile(self.config, grid, amcl.distance_m, seed)
+        amcl = AmclFilter(config, grid, seeds)
+        quantile = ScanQuantile(config, grid, amcl.distance_m, seeds)
+        matcher = ScanMatcher(config, grid, amcl.distance_m)
+        ledger = Ledger(scans.t_ns, T_odom_base, frame_id=view.manifest.frames.map or grid.frame_id)
 
-        n = len(scans)
-        xyyaw, cov = np.full((n, 3), np.nan), np.full((n, 3, 3), np.nan)
-        diagnostics = {name: np.full(n, np.nan) for name in _DIAGNOSTICS}
-        T_map_odom, published, clusters = np.zeros(3), np.zeros((3, 3)), 0
-        first = min(given, default=n)
-        for row in known[known >= first].tolist():
-            if row in given:
-                _start(amcl, given[row])
-            updated = amcl.is_due(T_odom_base[row])
-            if updated:
+        rows = known[known >= min(given, default=len(scans))]
+        stops = [*np.flatnonzero(np.isin(rows, list(given))).tolist(), len(rows)]
+        for at, end in pairwise(stops):
+            start = given[int(rows[at])]
+            if start.xyyaw is None:
+                amcl.initialise_globally()
+            else:
+                amcl.initialise(start.xyyaw, start.cov)
+            ledger.begin(int(rows[at]), start.xyyaw)
+            here = at
+            while here < end:
+                here += amcl.first_due(T_odom_base[rows[here:end]])
+                if here == end:
+                    break
+                row = int(rows[here])
                 amcl.predict(T_odom_base[row])
-                beams = self._beams(scans, row)
+                beams = _beams(config, scans, row)
                 if self.judge_scans:
-                    rank = quantile(amcl.particles, amcl.weights, beams)
-                    diagnostics["likelihood_quantile"][row] = rank
+                    returned = beams.returned
+                    rank = quantile(amcl.particles, amcl.weights, returned)
+                    ledger.judge(row, rank, returned, amcl)
+                before = amcl.published
                 amcl.correct(beams)
-                T_map_odom = se2.compose(amcl.mean_xyyaw, se2.inverse(T_odom_base[row]))
-                published, clusters = amcl.cov, amcl.clusters
-            xyyaw[row] = se2.compose(T_map_odom, T_odom_base[row])
-            cov[row] = published
-            diagnostics["updated"][row] = float(updated)
-            diagnostics["particles"][row] = float(len(amcl.particles))
-            diagnostics["ess"][row] = amcl.ess
-            diagnostics["clusters"][row] = float(clusters)
-        frames = view.manifest.frames
-        track = PoseTrack(
-            frames.map or grid.frame_id, frames.base or "base_link", scans.t_ns, xyyaw, cov
-        )
-        return Estimate(track, (), diagnostics)
+                ledger.update(row, amcl, is_published=amcl.published is not before or here == at)
+                here += 1
+        return ledger.estimate(rows, view.manifest.frames.base or "base_link", matcher)
 
-    def _beams(self, scans: ScanSet, row: int) -> Beams:
-        return used_beams(
-            self.config,
-            scans.bearings(row),
-            scans.ranges_m[row],
-            scans.hits[row],
-            scans.xyyaw_base_laser,
-            float(scans.range_max_m[row]),
-        )
+    def _perturbed(self, view: BundleView, seed: int) -> tuple[AmclConfig, tuple[int, ...]]:
+        """The configuration and the words of the seed, as a perturbation changes them."""
+        c, ratio = self.config, view.settings.get(PARTICLES, 1.0)
+        if ratio != 1.0:
+            least, most = (max(1, round(ratio * n)) for n in (c.min_particles, c.max_particles))
+            c = replace(c, min_particles=least, max_particles=most)
+        words = (c.random_seed if c.random_seed >= 0 else seed,)
+        other = round(view.settings.get(RANDOM_SEED, 0.0))
+        return c, (*words, other) if other else words
 
 
-def _start(amcl: AmclFilter, start: Start) -> None:
-    if start.xyyaw is None:
-        amcl.initialise_globally()
-    else:
-        amcl.initialise(start.xyyaw, start.cov)
+def _beams(config: AmclConfig, scans: ScanSet, row: int) -> Beams:
+    return used_beams(
+        config,
+        scans.bearings(row),
+        scans.ranges_m[row],
+        scans.hits[row],
+        scans.xyyaw_base_laser,
+        float(scans.range_max_m[row]),
+        scans.misses[row],
+    )

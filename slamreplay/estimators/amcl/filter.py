@@ -2,61 +2,68 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from slamreplay.errors import MapError
 from slamreplay.estimators.amcl import kernels
-from slamreplay.estimators.amcl.cloud import (
-    LEAST_RESULTANT,
-    SHARE,
-    circular_moments,
-    cluster_of,
-    histogram,
-)
 from slamreplay.estimators.amcl.config import AmclConfig
-from slamreplay.estimators.amcl.laser import Beams, likelihood_table, used_beams
+from slamreplay.estimators.amcl.heaps import Published, cell_of, cov_of, published
+from slamreplay.estimators.amcl.laser import Beams, used_beams
+from slamreplay.estimators.amcl.models import laser_model
+from slamreplay.estimators.amcl.motion import drive, step_of
+from slamreplay.estimators.amcl.noise import normals
 from slamreplay.estimators.start import DEFAULT_COV
 from slamreplay.geometry import se2
 from slamreplay.maps.grid import OccupancyGrid
 from slamreplay.maps.likelihood_field import distance_field
 
+#: A cloud is converged when all of it is this near to its mean along x and along y, m (nav2_amcl).
+_CONVERGED_M = 0.5
+#: Of the generator that moves particles; the other draws everything else.
+_MOTION_STREAM = 1
+
 
 class AmclFilter:
-    """A particle filter on a likelihood field, fed with odometry and scans.
+    """A particle filter fed with odometry and scans, as nav2_amcl is.
 
-    It follows nav2_amcl (differential motion model, `likelihood_field` laser model, KLD sampling,
-    augmented MCL recovery). It differs where this gives the same answer sooner or is told apart by
-    tests: resampling is systematic, not multinomial; headings are one circle for histogram and
-    clusters; recovery compares average likelihoods that do not depend on the particle count.
+    Both motion models, all three laser models, KLD sampling, augmented MCL recovery, and what is
+    published when. It differs where this gives the same answer sooner or is told apart by tests:
+    resampling is systematic, not multinomial; headings are one circle for histogram and clusters;
+    recovery compares average likelihoods that do not depend on the particle count.
 
     Args:
-        config: nav2_amcl's parameters.
+        config: the parameters.
         grid: the map.
-        seed: of every random number it draws.
+        seed: of every random number it draws; words of one.
     """
 
-    def __init__(self, config: AmclConfig, grid: OccupancyGrid, seed: int) -> None:
+    def __init__(self, config: AmclConfig, grid: OccupancyGrid, seed: int | Sequence[int]) -> None:
         self._config = config
         self._grid = grid
         self._rng = np.random.Generator(np.random.PCG64(seed))
+        words = np.random.SeedSequence(seed, spawn_key=(_MOTION_STREAM,)).generate_state(2)
+        self._keys = int(words[0]), int(words[1])
+        self._moves = self._updates = 0
+        self._slow = self._fast = self._ess = 0.0
+        self._is_converged = False
+        self._particles, self._weights = np.empty((3, 0)), np.empty(0)
         self._distance_m = distance_field(grid, config.laser_likelihood_max_dist)
-        self._scores = np.empty((0, 0), dtype=np.float32)
-        self._scores_range_m = np.nan
+        self._likelihood = laser_model(config, grid, self._distance_m)
         self._last_odometry: se2.Array | None = None
-        self._updates = 0
-        self._slow = self._fast = 0.0
         self.initialise(np.zeros(3), DEFAULT_COV)
 
     @property
     def particles(self) -> se2.Array:
         """(N, 3) x y yaw in the map frame, read-only."""
-        return self._particles
+        return _read_only(self._particles.T)
 
     @property
     def weights(self) -> se2.Array:
         """(N,) weights that sum to 1, read-only."""
-        return self._weights
+        return _read_only(self._weights)
 
     @property
     def distance_m(self) -> NDArray[np.float32]:
@@ -64,32 +71,14 @@ class AmclFilter:
         return self._distance_m
 
     @property
-    def mean_xyyaw(self) -> se2.Array:
-        """(3,) weighted mean of the heaviest cluster, as nav2_amcl publishes it."""
-        label = cluster_of(self._particles)
-        rows = label == np.argmax(np.bincount(label, self._weights))
-        mean, _ = circular_moments(self._particles[rows], self._weights[rows])
-        return mean
-
-    @property
-    def clusters(self) -> int:
-        """How many clusters carry a tenth of the weight or more: with two, mean and cov part."""
-        return int((np.bincount(cluster_of(self._particles), self._weights) >= SHARE).sum())
+    def published(self) -> Published:
+        """What the latest resampling, or start, made known: the robot's pose and covariance."""
+        return self._published
 
     @property
     def cov(self) -> se2.Array:
-        """(3, 3) of the whole set, as nav2_amcl publishes it with the heaviest cluster's mean.
-
-        Only xx, xy, yy and yaw-yaw are filled; the latter is circular: -2 ln R, R the length of
-        the mean heading vector.
-        """
-        mean, resultant = circular_moments(self._particles, self._weights)
-        off = self._particles[:, :2] - mean[:2]
-        cov = np.zeros((3, 3))
-        cov[:2, :2] = (off * self._weights[:, None]).T @ off
-        cov[1, 0] = cov[0, 1]
-        cov[2, 2] = -2.0 * np.log(np.clip(resultant, LEAST_RESULTANT, 1.0))
-        return cov
+        """(3, 3) of the whole set as it is now, as `published` has it."""
+        return cov_of(self._particles, self._weights)
 
     @property
     def ess(self) -> float:
@@ -118,11 +107,14 @@ class AmclFilter:
 
     def is_due(self, odometry_xyyaw: ArrayLike) -> bool:
         """Whether a scan taken at this odometry (3,) would update the filter."""
+        return self.first_due(np.atleast_2d(np.asarray(odometry_xyyaw, dtype=np.float64))) == 0
+
+    def first_due(self, odometry_xyyaw: se2.Array) -> int:
+        """The first of scans taken at odometry (N, 3) that would update the filter; N for none."""
         if self._last_odometry is None:
-            return True
-        delta = np.abs(_delta(self._last_odometry, odometry_xyyaw))
+            return 0
         d, a = self._config.update_min_d, self._config.update_min_a
-        return bool(delta[0] > d or delta[1] > d or delta[2] > a)
+        return int(kernels.first_beyond(odometry_xyyaw, self._last_odometry, d, a))
 
     def update(
         self,
@@ -132,6 +124,7 @@ class AmclFilter:
         usable: ArrayLike,
         xyyaw_base_laser: ArrayLike,
         range_max_m: float,
+        missed: ArrayLike = False,
     ) -> bool:
         """Take in one scan, if the robot has moved enough or the filter has just been started.
 
@@ -142,97 +135,82 @@ class AmclFilter:
             usable: (B,) which beams are returns inside the laser's range.
             xyyaw_base_laser: (3,) where the laser sits on the robot.
             range_max_m: the laser's largest range; the uniform part is spread over it.
+            missed: (B,) which beams saw nothing to the end of it.
 
         Returns:
-            Whether the filter was updated; if not, `mean_xyyaw` is still that of the last update.
+            Whether the filter was updated; if not, `published` is as it was.
         """
         if not self.is_due(odometry_xyyaw):
             return False
         self.predict(odometry_xyyaw)
         mount = xyyaw_base_laser
-        self.correct(used_beams(self._config, bearings, ranges_m, usable, mount, range_max_m))
+        self.correct(
+            used_beams(self._config, bearings, ranges_m, usable, mount, range_max_m, missed)
+        )
         return True
 
     def predict(self, odometry_xyyaw: ArrayLike) -> None:
         """Move the cloud to odometry (3,): what it then is was known before the next scan."""
         odometry = np.array(odometry_xyyaw, dtype=np.float64)
         if self._last_odometry is not None:
-            self._move(self._last_odometry[2], _delta(self._last_odometry, odometry))
+            delta = odometry - self._last_odometry
+            delta[2] = se2.wrap_angle(delta[2])
+            step = step_of(self._config, float(self._last_odometry[2]), delta)
+            noise = np.empty(self._particles.shape, dtype=np.float32)
+            normals(self._moves, *self._keys, noise)
+            particles = self._particles.copy()
+            drive(particles, step.numbers, noise)
+            self._moves += 1
+            self._particles = particles
         self._last_odometry = odometry
 
     def correct(self, beams: Beams) -> None:
         """Weigh the cloud by a scan, and draw it anew where that is due."""
+        c = self._config
         self._weigh(beams)
         self._updates += 1
-        if self._updates % self._config.resample_interval == 0:
-            self._resample()
-
-    def _move(self, old_yaw: float, delta: se2.Array) -> None:
-        """nav2's differential model: the bearing of a step under 1 cm is not trusted."""
-        c = self._config
-        distance = float(np.hypot(delta[0], delta[1]))
-        bearing = np.arctan2(delta[1], delta[0])
-        turn1 = float(se2.wrap_angle(bearing - old_yaw)) if distance >= 0.01 else 0.0
-        turn2 = float(se2.wrap_angle(delta[2] - turn1))
-        # Driving backwards is a turn by pi in this model, and no noisier than driving forwards.
-        size1 = min(abs(turn1), np.pi - abs(turn1))
-        size2 = min(abs(turn2), np.pi - abs(turn2))
-        variance = [
-            c.alpha1 * size1**2 + c.alpha2 * distance**2,
-            c.alpha3 * distance**2 + c.alpha4 * (size1**2 + size2**2),
-            c.alpha1 * size2**2 + c.alpha2 * distance**2,
-        ]
-        particles = self._particles.copy()
-        noise = self._rng.standard_normal(particles.shape)
-        kernels.move(particles, np.array([turn1, distance, turn2]), np.sqrt(variance), noise)
-        self._adopt(particles, self._weights)
+        if self._updates % c.resample_interval == 0:
+            if not c.selective_resampling or self._ess <= 0.5 * len(self._weights):
+                self._resample()
+            self._published = published(self._particles, self._weights)
 
     def _weigh(self, beams: Beams) -> None:
-        if self._scores_range_m != beams.reach_m:
-            # A beam's likelihood cubed: nav2's ad-hoc weighting scheme.
-            likelihood = likelihood_table(self._config, self._distance_m, beams.reach_m)
-            self._scores = (likelihood**3).astype(np.float32)
-            self._scores_range_m = beams.reach_m
-        likelihood = kernels.likelihoods(
-            self._particles,
-            beams.ends,
-            self._scores,
-            self._grid.origin_xyyaw,
-            self._grid.resolution_m,
+        likelihood, log_factor = self._likelihood(
+            self._particles, beams, is_converged=self._is_converged
         )
         weights = self._weights * likelihood
-        average = float(weights.sum())
+        total = float(weights.sum())
+        average = total * float(np.exp(log_factor))
         c = self._config
         self._slow += (c.recovery_alpha_slow if self._slow else 1.0) * (average - self._slow)
         self._fast += (c.recovery_alpha_fast if self._fast else 1.0) * (average - self._fast)
-        weights /= average
-        self._ess = float(1.0 / np.sum(weights**2))
-        self._adopt(self._particles, weights)
+        weights /= total
+        self._ess = float(1.0 / (weights @ weights))
+        self._weights = weights
 
     def _resample(self) -> None:
         c = self._config
         particles, weights = self._particles, self._weights
-        lost = max(0.0, 1.0 - self._fast / self._slow)
+        lost = max(0.0, 1.0 - self._fast / self._slow) if self._slow > 0.0 else 0.0
         if lost > 0.0:  # augmented MCL: the likelihood fell, so part of the set starts anywhere
             fresh = np.full(c.max_particles, lost / c.max_particles)
-            particles = np.vstack([particles, self._anywhere(c.max_particles)])
+            anywhere = np.ascontiguousarray(self._anywhere(c.max_particles).T)
+            particles = np.concatenate([particles, anywhere], axis=1)
             weights = np.concatenate([weights * (1.0 - lost), fresh])
             self._slow = self._fast = 0.0
         start_size, start_draw = self._rng.random(2)
-        cumulative = np.cumsum(weights)
-        distinct, bins = histogram(particles)
-        n = kernels.kld_size(
-            bins,
-            len(distinct),
-            cumulative,
-            start_size,
-            c.min_particles,
-            c.max_particles,
-            c.pf_err,
-            c.pf_z,
-        )
-        rows = kernels.systematic(cumulative, start_draw, n)
-        self._adopt(particles[rows], np.full(n, 1.0 / n))
+        n = c.max_particles
+        if c.min_particles < n:
+            cell = np.empty(len(weights), dtype=np.int64)
+            cells = len(cell_of(particles, cell))
+            n = kernels.kld_size(
+                cell, cells, np.cumsum(weights), start_size, c.min_particles, n, c.pf_err, c.pf_z
+            )
+        drawn = np.empty((3, n))
+        kernels.draw(particles, weights, start_draw, drawn)
+        self._particles, self._weights = drawn, np.full(n, 1.0 / n)
+        off = np.abs(drawn[:2] - drawn[:2].mean(axis=1, keepdims=True))
+        self._is_converged = bool(off.max() <= _CONVERGED_M)
 
     def _anywhere(self, n: int) -> se2.Array:
         free = np.argwhere(self._grid.free)
@@ -247,18 +225,15 @@ class AmclFilter:
         self._last_odometry = None
         self._updates = 0
         self._slow = self._fast = 0.0
-        self._adopt(particles, np.full(len(particles), 1.0 / len(particles)))
-        self._ess = float(len(particles))
-
-    def _adopt(self, particles: se2.Array, weights: se2.Array) -> None:
-        particles, weights = np.ascontiguousarray(particles), np.ascontiguousarray(weights)
-        particles.setflags(write=False)
-        weights.setflags(write=False)
-        self._particles, self._weights = particles, weights
+        self._is_converged = False
+        n = len(particles)
+        self._particles, self._weights = np.ascontiguousarray(particles.T), np.full(n, 1.0 / n)
+        self._ess = float(n)
+        self._published = published(self._particles, self._weights)
 
 
-def _delta(before: se2.Array, after: ArrayLike) -> se2.Array:
-    """Difference of two odometry poses (3,) along the odometry frame's axes."""
-    delta = np.asarray(after, dtype=np.float64) - before
-    delta[2] = se2.wrap_angle(delta[2])
-    return delta
+def _read_only(array: se2.Array) -> se2.Array:
+    """A view: an array that were itself read-only would have every loop compiled twice."""
+    view = array.view()
+    view.setflags(write=False)
+    return view

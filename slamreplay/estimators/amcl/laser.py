@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -33,12 +34,20 @@ class Beams:
     def __len__(self) -> int:
         return len(self.bearings)
 
+    @property
+    def returned(self) -> Beams:
+        """Those that came back; all but for the beam model."""
+        some = self.ranges_m < self.reach_m
+        if some.all():
+            return self
+        return replace(self, bearings=self.bearings[some], ranges_m=self.ranges_m[some])
+
     def thinned(self, most: int) -> Beams:
         """At most so many of them, evenly spaced."""
         some = slice(0, None, max(1, -(-len(self) // most)))
         return replace(self, bearings=self.bearings[some], ranges_m=self.ranges_m[some])
 
-    @property
+    @cached_property
     def ends(self) -> se2.Array:
         """(2, M) where they end, in the base frame, m."""
         return self.ends_at(self.ranges_m)
@@ -57,19 +66,38 @@ def used_beams(
     usable: ArrayLike,
     xyyaw_base_laser: ArrayLike,
     range_max_m: float,
+    missed: ArrayLike = False,
 ) -> Beams:
-    """`max_beams` evenly spaced beams (of B), those without a return inside the range left out."""
+    """`max_beams` evenly spaced beams (of B), those without a return inside the range left out.
+
+    The beam model also goes by those that `missed`, as returns from the end of the range; returns
+    nearer than `laser_min_range` are such, too.
+    """
     limit = config.laser_max_range if config.laser_max_range > 0.0 else np.inf
     reach_m = min(range_max_m if range_max_m > 0.0 else np.inf, limit)
     reach_m = reach_m if np.isfinite(reach_m) else _REACH_M
     bearing = np.asarray(bearings, dtype=np.float64)
     returned = np.asarray(ranges_m, dtype=np.float64)
-    used = np.zeros(len(bearing), dtype=bool)
+    spaced = np.zeros(len(bearing), dtype=bool)
     if config.max_beams >= 2:
-        used[:: max(1, (len(bearing) - 1) // (config.max_beams - 1))] = True
+        spaced[:: max(1, _stride(config, len(bearing)))] = True
+    usable = np.asarray(usable, dtype=bool)
     with np.errstate(invalid="ignore"):
-        used &= np.asarray(usable, dtype=bool) & (returned < reach_m)
+        used = spaced & usable & (returned < reach_m)
+        near = returned <= config.laser_min_range
+    if config.laser_min_range > 0.0:
+        used &= ~near
+    if config.laser_model_type == "beam":
+        ends = spaced & ~used & (usable | np.asarray(missed, dtype=bool))
+        used, returned = used | ends, np.where(ends, reach_m, returned)
     return Beams(bearing[used], returned[used], xyyaw_base_laser, reach_m)
+
+
+def _stride(config: AmclConfig, beams: int) -> int:
+    """Every how many beams one is used: nav2_amcl's models do not agree."""
+    if config.laser_model_type == "likelihood_field_prob":
+        return -(-beams // config.max_beams)
+    return (beams - 1) // (config.max_beams - 1)
 
 
 def likelihood_table(

@@ -9,12 +9,14 @@ one-step predictions: Diebold, Gunther, Tay 1998, Int. Economic Review 39, 863-8
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
-from slamreplay.estimators.amcl import kernels
 from slamreplay.estimators.amcl.config import AmclConfig
-from slamreplay.estimators.amcl.laser import Beams, likelihood_table
+from slamreplay.estimators.amcl.laser import Beams
+from slamreplay.estimators.amcl.models import BeamScores
 from slamreplay.geometry import se2
 from slamreplay.maps.grid import OccupancyGrid
 from slamreplay.maps.raycast import cast_rays
@@ -26,8 +28,6 @@ DRAWS = 19
 _CLOUD, _BEAMS = 32, 30
 #: Of the generator; the filter's own stream stays as it is.
 _STREAM = 1
-#: The likelihood of what the model calls impossible (z_rand 0); keeps logarithms finite.
-_LEAST = 1e-9
 
 
 class ScanQuantile:
@@ -47,14 +47,18 @@ class ScanQuantile:
     """
 
     def __init__(
-        self, config: AmclConfig, grid: OccupancyGrid, distance_m: NDArray[np.float32], seed: int
+        self,
+        config: AmclConfig,
+        grid: OccupancyGrid,
+        distance_m: NDArray[np.float32],
+        seed: int | Sequence[int],
     ) -> None:
         self._config = config
         self._grid = grid
-        self._rng = np.random.Generator(np.random.PCG64([seed, _STREAM]))
-        self._distance_m = distance_m
-        self._logs: NDArray[np.float32] = np.empty((0, 0), dtype=np.float32)
-        self._logs_reach_m = np.nan
+        self._rng = np.random.Generator(
+            np.random.PCG64(np.random.SeedSequence(seed, spawn_key=(_STREAM,)))
+        )
+        self._logs = BeamScores(config, grid, distance_m, None)
 
     def __call__(self, particles: se2.Array, weights: se2.Array, beams: Beams) -> float:
         """Quantile of a scan, (rank + 1/2) / (DRAWS + 1), or NaN where no beam is used.
@@ -67,18 +71,15 @@ class ScanQuantile:
         c = self._config
         if not len(beams) or c.z_hit + c.z_rand <= 0.0:
             return float("nan")
-        if self._logs_reach_m != beams.reach_m:
-            likelihood = likelihood_table(c, self._distance_m, beams.reach_m)
-            self._logs = np.log(np.maximum(likelihood, _LEAST)).astype(np.float32)
-            self._logs_reach_m = beams.reach_m
         beams = beams.thinned(_BEAMS)
         cumulative = np.cumsum(weights)
         drawn = np.searchsorted(cumulative, cumulative[-1] * self._rng.random(_CLOUD + DRAWS))
         drawn = np.minimum(drawn, len(weights) - 1)
-        cloud = np.ascontiguousarray(particles[drawn[:_CLOUD]])
+        cloud = np.ascontiguousarray(particles[drawn[:_CLOUD]].T)
         ranges_m = np.vstack([beams.ranges_m, self._ranges(particles[drawn[_CLOUD:]], beams)])
-        score, *others = self._log_likelihoods(cloud, beams.ends_at(ranges_m))
-        below = sum(other < score for other in others)
+        table = self._logs.of(beams)
+        score = table.log_means(table.local(cloud), beams.ends_at(ranges_m))
+        below = int((score[1:] < score[0]).sum())
         return (below + 0.5) / (DRAWS + 1.0)
 
     def _ranges(self, particles: se2.Array, beams: Beams) -> se2.Array:
@@ -92,13 +93,3 @@ class ScanQuantile:
         with np.errstate(invalid="ignore"):
             near = np.abs(ranges_m + c.sigma_hit * noise)  # no return comes from behind the laser
         return np.where(hits, near, anywhere * beams.reach_m)
-
-    def _log_likelihoods(self, cloud: se2.Array, ends: se2.Array) -> list[float]:
-        """Of scans (S, 2, M) under the whole cloud, up to what all have in common."""
-        origin, resolution_m = self._grid.origin_xyyaw, self._grid.resolution_m
-        logs = np.array(
-            [kernels.likelihoods(cloud, e, self._logs, origin, resolution_m) for e in ends]
-        )
-        top = logs.max(axis=1)
-        mean = np.exp(logs - top[:, None]).mean(axis=1)
-        return [float(value) for value in top + np.log(mean)]

@@ -22,6 +22,7 @@ from slamreplay.estimators.ekf.filter import filtered, gates_of
 from slamreplay.estimators.ekf.gyro import gyro_of
 from slamreplay.estimators.ekf.node.parameters import (
     LIVE,
+    NAMES,
     NodeParameters,
     names_of_inputs,
     node_parameters,
@@ -46,7 +47,7 @@ NODES = (
 )  # fmt: skip
 #: Axes of the innovations: what they measure and its unit.
 AXES = ("range m", "bearing rad", "heading rad")
-CARTESIAN_AXES = ("x m", "y m", "heading rad")
+NEAR_AXES = ("x m", "y m", "heading rad")
 FIX_AXES, TURN_AXES = ("x m", "y m"), ("turn rad",)
 
 
@@ -80,6 +81,7 @@ class Ekf:
     needs: ClassVar[frozenset[str]] = frozenset({"odometry"})
     settings: ClassVar[frozenset[str]] = SETTINGS
     parameter_nodes: ClassVar[tuple[str, ...]] = NODES
+    parameter_names: ClassVar[frozenset[str]] = NAMES
     live_parameters: ClassVar[tuple[str, ...]] = LIVE
 
     @classmethod
@@ -244,17 +246,18 @@ def _counts(what: str, held: Held) -> dict[str, float]:
 def _innovations(
     evidence: Evidence, done: Filtered, frame: str, base: str
 ) -> tuple[Innovations, ...]:
-    """A set for each kind of thing and number of axes, for fixes, and for the wheels' turns."""
+    """A set for each kind of thing and its axes, for fixes, and for the wheels' turns."""
     seen = evidence.observations
-    axes = CARTESIAN_AXES if seen.is_cartesian else AXES
     used = done.status != kernels.UNUSED
     sets = []
     for kind in sorted(set(seen.kind.tolist())):
-        for m in (2, 3):
-            rows = np.flatnonzero(used & (seen.kind == kind) & (seen.dims == m))
-            source = kind if m == 2 else f"{kind} with heading"
-            about = seen.names[seen.thing[rows]]
-            sets.append(_set(source, done.sighted, rows, axes[:m], base, about))
+        for near, m in ((False, 2), (False, 3), (True, 2), (True, 3)):
+            of_kind = (seen.kind == kind) & (seen.is_near == near) & (seen.dims == m)
+            rows = np.flatnonzero(used & of_kind)
+            source = f"{'near ' * near}{kind}{' with heading' * (m == 3)}"
+            axes, about = (NEAR_AXES if near else AXES)[:m], seen.names[seen.thing[rows]]
+            in_axes = frame if near and m == 3 else base
+            sets.append(_set(source, done.sighted, rows, axes, in_axes, about))
     if evidence.fixes is not None:
         rows = np.flatnonzero(done.fixed.status != kernels.UNUSED)
         about = np.full(len(rows), evidence.fixes.topic)

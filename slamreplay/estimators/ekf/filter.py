@@ -13,6 +13,7 @@ from slamreplay.estimators.ekf import kernels
 from slamreplay.estimators.ekf.consensus import LEAST_AGREEING, locate, window_of
 from slamreplay.estimators.ekf.motion import Motion, Steps
 from slamreplay.estimators.ekf.noise import Noise
+from slamreplay.estimators.ekf.observations import base_by
 from slamreplay.estimators.ekf.passing import Evidence, Filtered, Held
 from slamreplay.estimators.start import Start
 from slamreplay.geometry import se2
@@ -152,14 +153,21 @@ class _Pass:
         fixes, M = evidence.fixes, len(seen)
         F = 0 if fixes is None else len(fixes)
         self.sensed, self.R = np.zeros((M + F, 3)), np.zeros((M + F, 3, 3))
-        self.sensed[:M], self.R[:M] = seen.corrected(noise), seen.covariance(noise)
+        self.is_near = np.append(seen.is_near, np.zeros(F, dtype=bool))
+        self.seen_R = measurement_scale * seen.covariance(noise)
+        self.seen = seen.corrected(noise)
+        self.sensed[:M], self.R[:M] = self.seen, self.seen_R
+        near = np.flatnonzero(seen.is_near)
+        self.sensed[near], self.R[near] = seen.in_base(self.seen[near], self.seen_R[near])
+        whole = near[seen.dims[near] == 3]
+        at = seen.places[seen.thing[whole]]
+        self.sensed[whole], self.R[whole] = base_by(self.sensed[whole], self.R[whole], at)
         self.dims = np.append(seen.dims, np.full(F, 2))
         self.thing = np.append(seen.thing, np.full(F, -1))
         t_ns, self.antenna = seen.t_ns, np.zeros(2)
         if fixes is not None:
-            self.sensed[M:, :2], self.R[M:, :2, :2] = fixes.xy, fixes.cov
+            self.sensed[M:, :2], self.R[M:, :2, :2] = fixes.xy, measurement_scale * fixes.cov
             t_ns, self.antenna = np.append(t_ns, fixes.t_ns), fixes.antenna_xy
-        self.R *= measurement_scale
         self.held = Held.none(t_ns, 3)
         lasting = np.array([noise.lasting_range_per_m, noise.lasting_bearing_rad]) ** 2
         self.lasting = measurement_scale * lasting
@@ -206,7 +214,7 @@ class _Pass:
             kernels.run(
                 first, end, starts, events.t_ns, events.steps.xyyaw, events.steps.Q,
                 events.turns, events.turn_variance, events.measured, events.row, self.sensed,
-                self.R, self.dims, self.thing, seen.places, seen.is_cartesian, self.antenna,
+                self.R, self.dims, self.thing, seen.places, self.is_near, self.antenna,
                 self.gates, self.lasting, self.noise.lasting_s,
                 self.noise.gyro_bias_per_root_s**2, np.array([LOST_LEAST, LOST_NS]),
                 self.retry_ns, state.x, state.P, state.holder, state.seen, state.lost,
@@ -239,17 +247,18 @@ class _Pass:
         if len(rows) < LEAST_AGREEING:
             return None
         steps = self.motion.steps(events.t_ns[window], self.noise)
-        thing = seen.thing[rows]
+        thing, far = seen.thing[rows], ~self.is_near[rows]
+        sensed, R = self.seen[rows], self.seen_R[rows]
         # Settings that are too sure of themselves must not keep a robot from finding its start.
-        R = np.maximum(self.R[rows], seen.covariance(Noise())[rows])
+        R[far] = np.maximum(R[far], seen.covariance(Noise())[rows[far]])
         # A lasting error is one and the same in all sightings of a thing: they share its weight.
-        times = (thing[:, None] == thing[None, :]).sum(axis=1)
-        R[:, 0, 0] += times * self.lasting[0] * self.sensed[rows, 0] ** 2
+        times = far * (thing[:, None] == thing[None, :]).sum(axis=1)
+        R[:, 0, 0] += times * self.lasting[0] * sensed[:, 0] ** 2
         R[:, 1, 1] += times * self.lasting[1]
-        points, cov = seen.in_base(self.sensed[rows], R)
+        points, R = seen.in_base(sensed, R)
         found = locate(
             window_of(
-                points, seen.dims[rows], cov, seen.places[thing], thing, steps.xyyaw,
+                points, seen.dims[rows], R, seen.places[thing], thing, steps.xyyaw,
                 self.process_scale * steps.Q,
             )
         )  # fmt: skip

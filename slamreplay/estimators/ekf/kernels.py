@@ -161,16 +161,22 @@ def of_point(x, lever, H, expected):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def of_code(x, place, H, expected):  # type: ignore[no-untyped-def]
-    """Where a thing at `place` (3,) should be in the base: fills in `expected` (3,), H (3, n)."""
+def of_near(x, place, m, H, expected):  # type: ignore[no-untyped-def]
+    """What a near thing tells: for m = 3 the pose itself, for m = 2 its x and y in the base.
+
+    Fills in `expected` (m,) and H (m, n); `place` (3,) is the thing's.
+    """
     H[:, :] = 0.0
+    if m == 3:
+        for r in range(3):
+            expected[r] = x[r]
+            H[r, r] = 1.0
+        return
     cos, sin = np.cos(x[2]), np.sin(x[2])
     away_x, away_y = place[0] - x[0], place[1] - x[1]
     expected[0], expected[1] = cos * away_x + sin * away_y, cos * away_y - sin * away_x
-    expected[2] = place[2] - x[2]
     H[0, 0], H[0, 1], H[0, 2] = -cos, -sin, expected[1]
     H[1, 0], H[1, 1], H[1, 2] = sin, -cos, -expected[0]
-    H[2, 2] = -1.0
 
 
 @njit(cache=True)
@@ -374,7 +380,7 @@ def run(  # type: ignore[no-untyped-def]  # noqa: C901 - the filter's loop
     dims,
     things,
     places,
-    is_cartesian,
+    is_near,
     antenna,
     gates,
     lasting,
@@ -408,8 +414,8 @@ def run(  # type: ignore[no-untyped-def]  # noqa: C901 - the filter's loop
     (E,) of the gyroscope from the one before (NaN: none) and their variance `turn_variance` (E,);
     `measured` and `row` the index of what happens there or -1. Of the measurements (M,), `sensed`
     (M, 3), R (M, 3, 3), dims, and things: range, bearing and heading of a thing of the T in
-    `places` (T, 3), x, y and heading in the base where `is_cartesian`; or, where the thing is -1,
-    the x and y in the map of the `antenna` (2,) in the base. `gates`
+    `places` (T, 3); where it `is_near` (M,) x, y and heading of the base by it, for dims = 2 its
+    own x and y in the base; where the thing is -1, x and y of the `antenna` (2,). `gates`
     (4,) the largest NIS for each dimension. `lasting` (2,) variances of lasting errors,
     `lasting_s` their time constant; `bias_walk` variance of the bias after a second. The state x
     (n,), P (n, n), `holder` and `seen` (slots,), `lost` (3,): number and first time of the
@@ -452,13 +458,13 @@ def run(  # type: ignore[no-untyped-def]  # noqa: C901 - the filter's loop
             slot = slot_of(thing, holder, seen, x, P, lasting)
             if slot > 0:
                 seen[(slot - 3) // 2] = e
-            if is_cartesian:
-                of_code(x, places[thing], H, expected)
+            if is_near[s]:
+                of_near(x, places[thing], m, H, expected)
             else:
                 measurement(x, places[thing], slot, m, H, expected)
         for r in range(m):
             residual[r] = sensed[s, r] - expected[r]
-            if thing >= 0 and (r == 2 or (r == 1 and not is_cartesian)):
+            if thing >= 0 and (r == 2 or (r == 1 and not is_near[s])):
                 residual[r] = wrapped(residual[r])
         status_out[s] = take_in(
             s, m, gates[m], R[s], residual, x, P, H, HP, S, L, residual_out, S_out, moved_out

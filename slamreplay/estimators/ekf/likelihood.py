@@ -40,6 +40,8 @@ def log_densities(observations: Observations, done: Filtered, noise: Noise) -> s
         spread = np.log(np.diagonal(L, axis1=1, axis2=2)).sum(axis=1)
         fits[rows] = -0.5 * np.sum(white**2, axis=1) - spread - 0.5 * m * np.log(2.0 * np.pi)
     fits -= np.log(observations.stretch(noise))
+    near = observations.is_near  # a density of x and y, as one of range and bearing
+    fits[near] += np.log(observations.sensed[near, 0])
     return np.logaddexp(np.log1p(-OUTLIERS) + fits, np.log(OUTLIERS) + even)
 
 

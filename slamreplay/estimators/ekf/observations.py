@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import ClassVar, Self
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,8 @@ from slamreplay.geometry import se2
 
 #: Nothing is measured better than this, whatever a log states: 1 mm, 1 mrad.
 _FINEST = np.diag([1e-6, 1e-6, 1e-6])
+#: Things nearer than this are held against x and y, m.
+NEAR_M = 0.5
 #: A range is never taken to lack more than all but this share of it.
 _LEAST = 0.2
 
@@ -48,8 +50,6 @@ class Observations:
     unsurveyed: int
     names: NDArray[np.str_]
     repeated: int = 0
-
-    is_cartesian: ClassVar[bool] = False
 
     @classmethod
     def none(cls) -> Observations:
@@ -88,6 +88,15 @@ class Observations:
         out[:, 0] = np.maximum(out[:, 0], NEAREST_M)
         return out
 
+    @property
+    def is_near(self) -> NDArray[np.bool_]:
+        """(M,) whether a thing is so near that it is held against x and y, not range and bearing.
+
+        Errors of a bearing are Gaussian where the thing is many of its widths away; over a code in
+        the floor a bearing is anything.
+        """
+        return np.asarray(self.sensed[:, 0] < NEAR_M)
+
     @staticmethod
     def in_base(sensed: se2.Array, R: se2.Array) -> tuple[se2.Array, se2.Array]:
         """x, y, heading (M, 3) in the base, and their covariances, of those R (M, 3, 3) of it."""
@@ -108,7 +117,9 @@ class Observations:
         """
         R = np.zeros((len(self), 3, 3))
         R[:, 0, 0] = noise.range_m**2 + (noise.range_per_m * self.sensed[:, 0]) ** 2
-        R[:, 1, 1], R[:, 2, 2] = noise.bearing_rad**2, noise.heading_rad**2
+        # No bearing to a near thing is told better across than that of one at the end of near.
+        across = NEAR_M / np.clip(self.sensed[:, 0], NEAREST_M, NEAR_M)
+        R[:, 1, 1], R[:, 2, 2] = (across * noise.bearing_rad) ** 2, noise.heading_rad**2
         told = np.isfinite(self.stated[:, :2, :2]).all(axis=(1, 2))
         R[told, :2, :2] = noise.stated_ratio**2 * self.stated[told, :2, :2]
         told = np.isfinite(self.stated[:, 2, 2])
@@ -126,6 +137,27 @@ def cartesian(polar: se2.Array, R: se2.Array) -> tuple[se2.Array, se2.Array]:
     J[:, 2, 2] = 1.0
     seen = np.column_stack([reach * cos, reach * sin, polar[:, 2]])
     return seen, J @ R @ np.swapaxes(J, 1, 2)
+
+
+def base_by(seen: se2.Array, R: se2.Array, places: se2.Array) -> tuple[se2.Array, se2.Array]:
+    """The base in the map (M, 3), by things at known poses, and its covariances (M, 3, 3).
+
+    What is measured is then the state itself, and no linearisation stands between them, however far
+    off the state is: after a way without sightings one of them is enough.
+
+    Args:
+        seen: (M, 3) x, y, heading of the things in the base.
+        R: (M, 3, 3) of them.
+        places: (M, 3) the things in the map.
+    """
+    pose = se2.compose(places, se2.inverse(seen))
+    cos, sin = np.cos(pose[:, 2]), np.sin(pose[:, 2])
+    away = places - pose
+    J = np.zeros((len(seen), 3, 3))
+    J[:, 0, 0], J[:, 0, 1], J[:, 0, 2] = -cos, sin, -away[:, 1]
+    J[:, 1, 0], J[:, 1, 1], J[:, 1, 2] = -sin, -cos, away[:, 0]
+    J[:, 2, 2] = -1.0
+    return pose, J @ R @ np.swapaxes(J, 1, 2)
 
 
 def after_motion(

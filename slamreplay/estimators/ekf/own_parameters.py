@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import fields
-from difflib import get_close_matches
 from math import isfinite
 from typing import Any
 
 from slamreplay.errors import UsageError
 from slamreplay.estimators.ekf.noise import Noise
+from slamreplay.estimators.parameters import unknown_parameter
 
 
 def numbers_of(
@@ -31,9 +31,7 @@ def numbers_of(
     values: dict[str, dict[str, Any]] = {"own": {}, "noise": {}}
     for name, value in given.items():
         if name not in own | of_noise:
-            near = get_close_matches(name, sorted({*own, *of_noise, *others}), n=1)
-            hint = f"did you mean '{near[0]}'?" if near else f"there are: {', '.join(sorted(own))}"
-            raise UsageError(f"there is no parameter '{name}'", where=where, hint=hint)
+            raise unknown_parameter(name, (*own, *of_noise, *others), where)
         if isinstance(value, bool) or not isinstance(value, int | float) or not isfinite(value):
             raise UsageError(f"'{name}' is {value!r}: it should be a number", where=where)
         values["own" if name in own else "noise"][name] = float(value)

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from slamreplay.bundle.sightings import Sightings
 from slamreplay.estimators.ekf.noise import Noise
-from slamreplay.estimators.ekf.observations import Observations
+from slamreplay.estimators.ekf.observations import NEAR_M, Observations, cartesian
 from slamreplay.geometry import se2
 
 #: Nothing is measured better than this, whatever a log states: 1 mm, 1 mrad.
@@ -23,14 +22,11 @@ class CodeNoise:
     """Standard deviations of what is read of a code.
 
     Attributes:
-        code_m: of its place along each axis when it lies right below, m: print, lens and where it
-            was laid,
-        code_per_m: and for each metre that it is away, m; its variance is added to the former's.
+        code_m: of its place along each axis, m: print, lens and where it was laid.
         code_rad: of its heading, rad.
     """
 
     code_m: float
-    code_per_m: float
     code_rad: float
 
 
@@ -42,26 +38,32 @@ class Codes(Observations):
         code_noise: of those whose covariance the log does not state.
     """
 
-    code_noise: CodeNoise = CodeNoise(0.005, 0.02, 0.01)
+    code_noise: CodeNoise = CodeNoise(0.005, 0.01)
 
-    is_cartesian: ClassVar[bool] = True
+    @property
+    def is_near(self) -> NDArray[np.bool_]:
+        """(M,) all: a code is held against x and y wherever it was seen."""
+        return np.ones(len(self), dtype=bool)
 
     def corrected(self, noise: Noise) -> se2.Array:  # noqa: ARG002 - no lens is known
         """(M, 3) `sensed`, as it is."""
         return self.sensed.copy()
 
     def covariance(self, noise: Noise, scale: float = 1.0) -> se2.Array:
-        """(M, 3, 3) of `sensed`: the log's own, else by the distance.
+        """(M, 3, 3) of `sensed`: the log's own, else a code's, or a tag's where it is not near.
 
         Args:
-            noise: of which the ratio for what is stated counts.
+            noise: of ranges, bearings and headings of tags, and the ratio for what is stated.
             scale: ratio by which all variances are multiplied.
         """
+        x, y, heading = self.sensed.T
+        away = np.hypot(x, y)
+        polar = np.zeros((len(self), 3, 3))
+        polar[:, 0, 0] = noise.range_m**2 + (noise.range_per_m * away) ** 2
+        polar[:, 1, 1], polar[:, 2, 2] = noise.bearing_rad**2, noise.heading_rad**2
+        _, R = cartesian(np.column_stack([away, np.arctan2(y, x), heading]), polar)
         own = self.code_noise
-        away = np.hypot(self.sensed[:, 0], self.sensed[:, 1])
-        R = np.zeros((len(self), 3, 3))
-        R[:, 0, 0] = R[:, 1, 1] = own.code_m**2 + (own.code_per_m * away) ** 2
-        R[:, 2, 2] = own.code_rad**2
+        R[away < NEAR_M] = np.diag([own.code_m, own.code_m, own.code_rad]) ** 2
         told = np.isfinite(self.stated[:, :2, :2]).all(axis=(1, 2))
         R[told, :2, :2] = noise.stated_ratio**2 * self.stated[told, :2, :2]
         turned = np.isfinite(self.stated[:, 2, 2])

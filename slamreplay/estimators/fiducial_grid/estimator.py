@@ -16,6 +16,7 @@ from slamreplay.errors import NotApplicableError, UsageError
 from slamreplay.estimators.ekf.estimator import SETTINGS, estimate_of, scales_of
 from slamreplay.estimators.ekf.filter import filtered, gates_of
 from slamreplay.estimators.ekf.gyro import gyro_of
+from slamreplay.estimators.ekf.kernels import ACCEPTED
 from slamreplay.estimators.ekf.noise import Noise
 from slamreplay.estimators.ekf.own_parameters import numbers_of
 from slamreplay.estimators.ekf.passing import Evidence
@@ -42,19 +43,17 @@ class FiducialGrid:
     that it reads has been rejected for ten seconds.
 
     Attributes:
-        code_m: standard deviation of a code's place right below, along each axis, m,
-        code_per_m: and for each metre that it is away, m.
-        code_rad: of its heading, rad.
+        code_m: standard deviation of where a code is read along each axis, m,
+        code_rad: and how it is turned, rad; of one within half a metre.
         spacing_m: from one code to the next, m; 0 has it found in the log,
         columns: numbers to a row; 0 has it found in the log.
-        noise: of odometry and gyroscope.
+        noise: of odometry, gyroscope, and tags that are farther away.
         gate_probability: with which a code that is read rightly is taken in.
         update_min_d: a code is taken in again after driving this far, m,
         update_min_a: or turning by this much, rad.
     """
 
     code_m: float = 0.005
-    code_per_m: float = 0.02
     code_rad: float = 0.01
     spacing_m: float = 0.0
     columns: int = 0
@@ -75,7 +74,7 @@ class FiducialGrid:
                 raise UsageError(
                     f"{name} is {getattr(self, name)}", where=self.name, hint="above 0"
                 )
-        for name in ("code_per_m", "spacing_m", "columns"):
+        for name in ("spacing_m", "columns"):
             if not getattr(self, name) >= 0.0:
                 value = getattr(self, name)
                 raise UsageError(f"{name} is {value}", where=self.name, hint="not negative")
@@ -117,7 +116,7 @@ class FiducialGrid:
             what = "needs places of the codes: no survey, and their numbers follow no lattice"
             raise NotApplicableError(what, where=self.name, hint=hint)
         frame = frame or view.manifest.frames.map or "map"
-        codes = codes_of(sightings, places, CodeNoise(self.code_m, self.code_per_m, self.code_rad))
+        codes = codes_of(sightings, places, CodeNoise(self.code_m, self.code_rad))
         codes = codes.of_moving(odometry, self.update_min_d, self.update_min_a)
         scans = scan_set(view)
         row_ns = odometry.t_ns if scans is None else scans.t_ns
@@ -135,10 +134,13 @@ class FiducialGrid:
             scalars["lattice_spacing_m"] = lattice.spacing_m
             scalars["lattice_columns"] = float(lattice.columns)
             scalars["lattice_share"] = lattice.share
-        taken = codes.t_ns[done.status == 1]
+        taken = codes.t_ns[done.status == ACCEPTED]
         ends = np.concatenate([row_ns[:1], taken, row_ns[-1:]])
         scalars["longest_without_code_s"] = float(np.diff(ends).max(initial=0)) / NS_PER_S
-        return replace(estimate, scalars=scalars)
+        sets = tuple(
+            replace(one, source=one.source.removeprefix("near ")) for one in estimate.innovations
+        )
+        return replace(estimate, innovations=sets, scalars=scalars)
 
 
 def _places(

@@ -22,8 +22,11 @@ from slamreplay.geometry.times import ns
 
 #: Ways between codes that odometry tells well: within this time.
 _SOON_S = 20.0
-#: So many pairs are needed, and this share of them must agree with the lattice that is found.
-_LEAST, _SHARE = 8, 0.7
+#: Codes that seem nearer to each other than this part of a step are one that was read two ways.
+_SAME = 0.5
+#: So many pairs are needed, of them so many of neighbours in a row, and this share must agree with
+#: the lattice that is found.
+_LEAST, _FEWEST, _SHARE = 8, 2, 0.7
 #: A way agrees when it is this near to a whole number of steps, as a share of one.
 _NEAR = 0.2
 #: Surveyed codes must lie where the lattice has them, as a share of a step.
@@ -94,17 +97,22 @@ def lattice_of(
     names, number = _numbers(sightings)
     usable = np.flatnonzero((number[:, 0] >= 0) & np.isfinite(sightings.xyyaw[:, 2]))
     before, after, way = _ways(sightings, motion, usable)
+    step = number[after] - number[before]
+    in_pairs = bool((number[usable, 1] >= 0).all())
+    neighbours = np.flatnonzero(np.abs(step if in_pairs else step[:, :1]).sum(axis=1) == 1)
+    if spacing_m is None:
+        if len(neighbours) < _FEWEST:
+            return None
+        spacing_m = float(np.median(np.hypot(*way[neighbours].T)))
+    moved = np.hypot(*way.T) > _SAME * spacing_m
+    before, step, way = before[moved], step[moved], way[moved]
     if len(way) < _LEAST:
         return None
-    step = number[after] - number[before]
-    if (number[usable, 1] >= 0).all():
-        found = _of_pairs(step, way, spacing_m)
-        columns = 0
-    else:
-        found = _of_rows(step[:, 0], way, spacing_m, columns)
+    found = _of_pairs(step, way / spacing_m) if in_pairs else (
+        _of_rows(step[:, 0], way / spacing_m, columns))  # fmt: skip
     if found is None:
         return None
-    spacing_m, columns, steps_per, share = found
+    columns, steps_per, share = found
     unique, first = np.unique(names[usable], return_index=True)
     cells = _cells(number[usable[first]], columns, steps_per, number[before], step, way, spacing_m)
     return Lattice(spacing_m, columns, cells, unique.astype(str), share)
@@ -148,24 +156,21 @@ def _ways(
     return before[keep], after[keep], way[keep, :2]
 
 
-_Found = tuple[float, int, NDArray[np.int64], float]
+_Found = tuple[int, NDArray[np.int64], float]
 
 
-def _of_rows(
-    step: NDArray[np.int64], way: se2.Array, spacing_m: float | None, columns: int | None
-) -> _Found | None:
-    """Spacing, columns, steps (2, 2) along the axes for a column and a row, and share that agrees.
+def _of_rows(step: NDArray[np.int64], way: se2.Array, columns: int | None) -> _Found | None:
+    """Columns, steps (2, 2) along the axes for a column and a row, and the share that agrees.
 
-    Neighbours in a row have numbers that differ by one. Of the ways across, those of one step each
-    tell how many numbers a row has.
+    Of the ways across rows, each tells how many numbers a row would have.
+
+    Args:
+        step: (P,) by how much the numbers differ.
+        way: (P, 2) in steps.
+        columns: where it is known.
     """
-    next_ = np.abs(step) == 1
-    if spacing_m is None:
-        if next_.sum() < 2:
-            return None
-        spacing_m = float(np.median(np.hypot(*way[next_].T)))
-    whole = np.rint(way / spacing_m).astype(np.int64)
-    near = np.abs(way / spacing_m - whole).max(axis=1) < _NEAR
+    whole = np.rint(way).astype(np.int64)
+    near = np.abs(way - whole).max(axis=1) < _NEAR
     best: _Found | None = None
     for axis in (0, 1):
         for sign in (1, -1):
@@ -177,31 +182,26 @@ def _of_rows(
             for width in sorted(set(candidates)):
                 agree = near & (step == along + width * across)
                 share = float(agree.mean())
-                if 1 < abs(width) <= _WIDEST and (best is None or share > best[3]):
+                if 1 < abs(width) <= _WIDEST and (best is None or share > best[2]):
                     per = np.zeros((2, 2), dtype=np.int64)
                     per[0, axis], per[1, 1 - axis] = sign, 1 if width > 0 else -1
-                    best = spacing_m, abs(width), per, share
-    return best if best is not None and best[3] >= _SHARE else None
+                    best = abs(width), per, share
+    return best if best is not None and best[2] >= _SHARE else None
 
 
-def _of_pairs(step: NDArray[np.int64], way: se2.Array, spacing_m: float | None) -> _Found | None:
-    """The same where names hold a number for each axis."""
-    size = np.abs(step).sum(axis=1)
-    if spacing_m is None:
-        if (size == 1).sum() < 2:
-            return None
-        spacing_m = float(np.median(np.hypot(*way[size == 1].T)))
-    whole = np.rint(way / spacing_m).astype(np.int64)
-    near = np.abs(way / spacing_m - whole).max(axis=1) < _NEAR
+def _of_pairs(step: NDArray[np.int64], way: se2.Array) -> _Found | None:
+    """The same where names hold a number for each axis: steps (P, 2) of both, ways in steps."""
+    whole = np.rint(way).astype(np.int64)
+    near = np.abs(way - whole).max(axis=1) < _NEAR
     best: _Found | None = None
     for first in (0, 1):
         for signs in ((1, 1), (1, -1), (-1, 1), (-1, -1)):
             per = np.zeros((2, 2), dtype=np.int64)
             per[0, first], per[1, 1 - first] = signs
             share = float((near & (whole == step @ per).all(axis=1)).mean())
-            if best is None or share > best[3]:
-                best = spacing_m, 0, per, share
-    return best if best is not None and best[3] >= _SHARE else None
+            if best is None or share > best[2]:
+                best = 0, per, share
+    return best if best is not None and best[2] >= _SHARE else None
 
 
 def _cells(

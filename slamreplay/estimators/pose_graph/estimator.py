@@ -27,6 +27,8 @@ from slamreplay.estimators.start import GLOBAL, OFFSET, ROTATE
 from slamreplay.geometry import se2
 
 SETTINGS = frozenset({OFFSET, ROTATE, GLOBAL, MIN_SCORE, PROCESS_NOISE, MEASUREMENT_NOISE})
+#: Why the conformance kit cannot make a world that has its noise.
+WITHOUT_NOISE = "what a match weighs is measured on the log, not told"
 NEEDS = frozenset({"scans"})
 WITHOUT_NOISE = (
     "it learns from the log what scans miss, and allows for errors that neighbouring beams have in "

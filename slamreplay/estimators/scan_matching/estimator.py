@@ -41,6 +41,7 @@ class ScanMatching:
     name: ClassVar[str] = "scan_matching"
     needs: ClassVar[frozenset[str]] = frozenset({"scans"})
     settings: ClassVar[frozenset[str]] = frozenset({OFFSET, ROTATE})
+    without_noise: ClassVar[str] = "what a match weighs is measured on the log, not told"
 
     @classmethod
     def from_parameters(cls, given: Mapping[str, object]) -> Self:

@@ -71,7 +71,7 @@ def row_words(one: Innovations, row: int) -> str:
         float(one.score[row]),
         float(one.nis_of(np.array([row]))[0]),
     )
-    words = [f"{one.source} {about}".strip()]
+    words = [about if about.startswith(one.source) else f"{one.source} {about}".strip()]
     words += [f"score {score:.2f}"] if np.isfinite(score) else []
     words += [f"NIS {nis:.3g}"] if np.isfinite(nis) else []
     return ", ".join(words)
@@ -85,12 +85,12 @@ def _jump(
     is_recorded = context.subject in ("", *RECORDED)
     made = "" if is_recorded else _made_by(step, ledger)
     if is_recorded:
-        causes = [_when(e, step) for e in near[:3]] + _of_localizer(context, step, ledger)
+        causes = [e.near(step.t_ns) for e in near[:3]] + _of_localizer(context, step, ledger)
         cause = "; ".join(causes) or "an update of its own: nothing else in the log is near it"
     elif made:
         cause = made
     else:  # of runs only what they read of the log can move them beside their measurements
-        cause = "; ".join(_when(e, step) for e in near[:3]) or _unexplained(ledger)
+        cause = "; ".join(e.near(step.t_ns) for e in near[:3]) or _unexplained(ledger)
     before, after = _errors(context, step)
     return Jump(step, cause, bool(near) and near[0].is_given and not made, before, after)
 
@@ -112,13 +112,6 @@ def _made_by(step: Step, ledger: Sequence[Innovations]) -> str:
     moved = one.moved[row]
     size_words = f"{np.hypot(*moved[:2]):.2f} m, {np.degrees(abs(moved[2])):.0f} deg"
     return f"{row_words(one, row)}, moved it by {size_words}"
-
-
-def _when(event: Event, step: Step) -> str:
-    apart = (event.t_ns - step.t_ns) / NS_PER_S
-    if abs(apart) < 0.05:
-        return event.text
-    return f"{event.text} {abs(apart):.1f} s {'later' if apart > 0.0 else 'before'}"
 
 
 def _of_localizer(context: CheckContext, step: Step, ledger: Sequence[Innovations]) -> list[str]:

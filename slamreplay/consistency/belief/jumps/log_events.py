@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -12,9 +12,11 @@ from slamreplay.audit.tf_steps import odometry_jumps
 from slamreplay.bundle.belief import arrival_ns
 from slamreplay.bundle.odometry import odometry_track
 from slamreplay.bundle.recoveries import kind_of_recovery
+from slamreplay.bundle.run import Innovations
 from slamreplay.bundle.sightings import KINDS
 from slamreplay.bundle.view import BundleView
-from slamreplay.geometry.times import NS_PER_S
+from slamreplay.consistency.belief.jumps.steps import sizes_of
+from slamreplay.geometry.times import NS_PER_S, ns
 
 #: A thing that was not seen for this long is news when it is seen again.
 _NEWS_NS = 5 * NS_PER_S
@@ -40,8 +42,15 @@ class Event:
 
     def may_have_made(self, before_ns: int, t_ns: int) -> bool:
         """Whether a step between two times can be its doing."""
-        low, high = self.t_ns - self.from_s * NS_PER_S, self.t_ns + self.until_s * NS_PER_S
+        low, high = self.t_ns - ns(self.from_s), self.t_ns + ns(self.until_s)
         return low <= t_ns and before_ns <= high
+
+    def near(self, t_ns: int) -> str:
+        """The text, and how long before or after a time it was."""
+        apart = (self.t_ns - t_ns) / NS_PER_S
+        if abs(apart) < 0.05:
+            return self.text
+        return f"{self.text} {abs(apart):.1f} s {'later' if apart > 0.0 else 'before'}"
 
 
 def log_events(view: BundleView) -> tuple[Event, ...]:
@@ -49,6 +58,19 @@ def log_events(view: BundleView) -> tuple[Event, ...]:
     found = [*_given(view), *_closures(view), *_seen_anew(view), *_relocalized(view), *_maps(view),
              *_odometry(view)]  # fmt: skip
     return tuple(sorted(found, key=lambda event: (event.t_ns, event.text)))
+
+
+def with_subjects(ledger: Innovations, view: BundleView) -> Innovations:
+    """The ledger of a recorded localizer, each event told at the word it may have moved most."""
+    about: list[list[str]] = [[] for _ in range(len(ledger.t_ns))]
+    size = np.nan_to_num(sizes_of(ledger.moved), nan=-1.0)
+    for event in log_events(view):
+        low, high = event.t_ns - ns(event.from_s), event.t_ns + ns(event.until_s)
+        rows = np.flatnonzero((ledger.t_ns >= low) & (ledger.t_ns <= high))
+        if len(rows):
+            row = int(rows[int(np.argmax(size[rows]))])
+            about[row].append(event.near(int(ledger.t_ns[row])))
+    return replace(ledger, about=np.array(["; ".join(texts) for texts in about], dtype=np.str_))
 
 
 def _given(view: BundleView) -> Iterator[Event]:

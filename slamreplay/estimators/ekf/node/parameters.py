@@ -5,13 +5,13 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
-from difflib import get_close_matches
 from math import isfinite
 from typing import Any
 
 import numpy as np
 
 from slamreplay.errors import UsageError
+from slamreplay.estimators.parameters import unknown_parameter
 from slamreplay.geometry import se2
 from slamreplay.geometry.transforms import clean_frame
 
@@ -47,6 +47,15 @@ LIVE = (
     "acceleration_gains", "deceleration_limits", "deceleration_gains", "diagnostics_updater.*",
     "*_queue_size", "*_nodelay", "*_pose_use_child_frame",
 )  # fmt: skip
+#: As many inputs of a kind as a file for all nodes may speak of.
+_INPUTS = 10
+#: Every name that a node knows.
+NAMES = frozenset(_OF_NODE) | {
+    name
+    for kind, parts in _OF_INPUT.items()
+    for one in (f"{kind}{number}" for number in range(_INPUTS))
+    for name in (one, *(f"{one}_{part}" for part in parts))
+}
 
 
 @dataclass(frozen=True)
@@ -129,9 +138,7 @@ def node_parameters(given: Mapping[str, object]) -> NodeParameters:
         known |= {name, *(f"{name}_{part}" for part in _OF_INPUT[kind])}
     for key in given:
         if key not in known:
-            near = get_close_matches(key, sorted(known), n=1)
-            hint = f"did you mean '{near[0]}'?" if near else f"there are: {', '.join(_OF_NODE)}"
-            raise UsageError(f"there is no parameter '{key}'", where="ekf", hint=hint)
+            raise unknown_parameter(key, tuple(known), "ekf")
     odom_frame = _text(given, "odom_frame", "odom")
     base = _text(given, "base_link_frame", "")
     return NodeParameters(
