@@ -43,6 +43,7 @@ class Candidate:
         residual: (3,) measured minus predicted.
         S: (3, 3) covariance predicted for it: of the prediction and of the match.
         nis: r' S^-1 r.
+        yaw: heading of the old one's reference at that time, rad; it turns axes into the graph's.
         accepted: whether the graph took it in.
         moved: (3,) by how much the new submap moved when it was taken in; NaN where it waited for
             others, with which it was taken in later.
@@ -56,6 +57,7 @@ class Candidate:
     residual: se2.Array
     S: se2.Array
     nis: float
+    yaw: float = 0.0
     accepted: bool = False
     moved: se2.Array = field(default_factory=lambda: np.zeros(3))
 
@@ -211,7 +213,7 @@ class _Closer:
         nis = float(residual @ np.linalg.solve(S, residual))
         if place.score >= self.config.min_score:
             self._told.append(float(residual @ np.linalg.solve(relative + cov, residual)))
-        return Candidate(on, new, z, cov, place.score, residual, S, nis)
+        return Candidate(on, new, z, cov, place.score, residual, S, nis, float(poses[on, 2]))
 
     def _judge(self, found: Candidate, *, is_sure: bool) -> None:
         agreeing: list[int] = []
