@@ -357,3 +357,13 @@ def test_relations_of_real_logs(real_logs, tmp_path, name, near_m, near_deg, all
     assert distance.mean() < all_m
     assert turn.mean() < all_deg
     assert not local.is_break.any()
+
+
+def test_open3d_may_take_the_steps():
+    pytest.importorskip("open3d", exc_type=(ImportError, OSError))
+    truth = way(4.0)
+    local = run_local(scans_of(room_scans(truth), truth), MatchConfig(icp="open3d"))
+    off = se2.between(se2.between(truth[0], truth), local.xyyaw)
+    assert np.hypot(off[:, 0], off[:, 1]).max() < 0.03
+    with pytest.raises(UsageError, match="icp"):
+        ScanMatching.from_parameters({"icp": "gicp"})

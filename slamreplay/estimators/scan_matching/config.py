@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 
 @dataclass(frozen=True)
@@ -13,6 +14,8 @@ class MatchConfig:
     way; how much of it there is on a log is learned from the matches on the go.
 
     Attributes:
+        icp: what lays a scan onto the lines after it was found: `native`, point to line with the
+            prior in it, or `open3d`, with the prior after it, to compare with.
         node_m: a scan becomes a node after so much motion, m.
         node_rad: or after so much turning, rad.
         memory: lines that none of so many nodes have seen are forgotten.
@@ -28,6 +31,7 @@ class MatchConfig:
         lost_scans: after so many scans that match nothing a new map is begun.
     """
 
+    icp: Literal["native", "open3d"] = "native"
     node_m: float = 0.2
     node_rad: float = 0.2
     memory: int = 60

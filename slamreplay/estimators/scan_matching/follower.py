@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -11,6 +12,7 @@ from slamreplay.estimators.scan_matching.config import MatchConfig
 from slamreplay.geometry import se2
 from slamreplay.matching.field import ScoreField
 from slamreplay.matching.line_map import LineMap, align
+from slamreplay.matching.line_target import LineTarget, line_target
 
 #: Scans with fewer points are not matched.
 LEAST_POINTS = 10
@@ -109,6 +111,7 @@ class Follower:
         self._expected, self._held, self._jitter = (np.empty((3, 3)) for _ in range(3))
         self._room, self._sums = np.empty((3, 3, 3)), np.empty((4, 3))
         self._field: ScoreField | None = None
+        self._target: LineTarget | None = None
 
     def begin(self, points: se2.Array, normals: se2.Array) -> None:
         """A new map, of one scan at the present pose."""
@@ -118,7 +121,7 @@ class Follower:
 
     def _start_node(self) -> None:
         self.cov, self.carried = np.zeros((2, 3, 3))
-        self.lost, self._field = 0, None
+        self.lost, self._field, self._target = 0, None, None
 
     def add_node(self, points: se2.Array, normals: se2.Array) -> tuple[se2.Array, se2.Array]:
         """Put the last scan into the map.
@@ -154,7 +157,8 @@ class Follower:
         if len(points) < LEAST_POINTS:
             return self._missed(prior, np.nan)
         pose, score, nis = self._laid(points, normals, prior)
-        if score < self.config.doubted * self.typical or nis > DOUBTED_NIS:
+        # Odometry that is wrong for long is no news.
+        if self._is_doubted(score) or (nis > DOUBTED_NIS and not self.is_refuted):
             pose, score, nis = self._searched(points, normals, before, (pose, score, nis))
         if score < self.config.poor * self.typical:
             return self._missed(prior, score)
@@ -183,16 +187,30 @@ class Follower:
         """Where the scan lies best near `start` (3,), its score, and r' S^-1 r."""
         c, pose = self.config, start.copy()
         variance = max(self.variance, FINEST_M**2) * c.points_per_fact
+        if c.icp == "open3d":
+            pose = self._registered(points, pose)
         score, self._squares, trust = align(
             self.map.tags, self.map.lines, self.map.now - c.memory, points, normals, pose,
-            self._prior, self._held, c.sigma_m, variance, MOST_STEPS, self._sums,
+            self._prior, self._held, c.sigma_m, variance, MOST_STEPS * (c.icp == "native"),
+            self._sums,
         )  # fmt: skip
+        if c.icp == "open3d":
+            held = self._held + self._sums[:3] / variance
+            pose += np.linalg.solve(held, self._held @ _off(self._prior, pose))
         pose[2] = se2.wrap_angle(pose[2])
         nis = fusion.fuse(
             self._prior, self._expected, self._held, trust, self._noise, pose, self._sums,
             variance, self._jitter, self._told, self._room,
         )  # fmt: skip
         return pose, score, nis
+
+    def _registered(self, points: se2.Array, start: se2.Array) -> se2.Array:
+        """(3,) where Open3D puts the scan on the map's points."""
+        from slamreplay.matching.open3d_icp import icp_open3d
+
+        if self._target is None:
+            self._target = line_target(self.map.points(self.pose[:2], rescue.RADIUS_M))
+        return icp_open3d(self._target, points, start).xyyaw
 
     def _searched(
         self,
@@ -202,17 +220,26 @@ class Follower:
         best: tuple[se2.Array, float, float],
     ) -> tuple[se2.Array, float, float]:
         """The best of `_laid` from where a wider search finds the scan, if better than `best`."""
-        if self._field is None:
-            self._field = rescue.search_field(self.map, before)
-        if self._field is None:
-            return best
         told, squares = self._told.copy(), self._squares
-        for place in rescue.places(self._field, points, self._prior, before):
+        for place in self._places(points, before):
             found = self._laid(points, normals, place)
             if found[1] > best[1] + GAIN:
                 best, told, squares = found, self._told.copy(), self._squares
+            if not self._is_doubted(best[1]):
+                break
         self._told, self._squares = told, squares
         return best
+
+    def _places(self, points: se2.Array, before: se2.Array) -> Iterator[se2.Array]:
+        """Where the scan might lie (3,): at the speed of before, then wherever it is found."""
+        yield se2.compose(before, self.motion)
+        if self._field is None:
+            self._field = rescue.search_field(self.map, before)
+        if self._field is not None:
+            yield from rescue.places(self._field, points, self._prior, before)
+
+    def _is_doubted(self, score: float) -> bool:
+        return score < self.config.doubted * self.typical
 
     def _accepted(self, prior: se2.Array, pose: se2.Array, score: float, nis: float) -> Fit:
         told, moved = self._told, _off(pose, prior)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from slamreplay.geometry import se2
@@ -28,8 +30,8 @@ def search_field(local_map: LineMap, centre: se2.Array) -> ScoreField | None:
 
 def places(
     field: ScoreField, points: se2.Array, expected: se2.Array, last: se2.Array
-) -> list[se2.Array]:
-    """Where a scan might lie, the nearest window first.
+) -> Iterator[se2.Array]:
+    """Where a scan might lie (3,), looked for as they are asked for, the nearest window first.
 
     Args:
         field: around the map.
@@ -38,5 +40,6 @@ def places(
         last: (3,) pose of the scan before, which a robot that is turned by hand stays near.
     """
     some = points[:: -(-len(points) // MOST_POINTS)]
-    found = [search_window(field, some, expected, window)[0] for window in WINDOWS]
-    return [*found, search_window(field, some, last, AROUND)[0]]
+    for window in WINDOWS:
+        yield search_window(field, some, expected, window)[0]
+    yield search_window(field, some, last, AROUND)[0]
