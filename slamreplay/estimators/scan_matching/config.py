@@ -42,6 +42,6 @@ class MatchConfig:
     heading_per_metre: float = 0.08
     heading_per_turn: float = 0.12
     late_part: float = 0.05
-    doubted: float = 0.8
+    doubted: float = 0.9
     poor: float = 0.45
     lost_scans: int = 5

@@ -48,9 +48,9 @@ def local_trajectory(
     gaps = np.diff(scans.t_ns, prepend=scans.t_ns[:1]) / 1e9
     for k in range(n):
         during = told.during[k]
-        is_told = odometry is not None and not follower.is_refuted
-        if not is_told and sweeps[k] > 0.0 and gaps[k] > 0.0:
-            during = min(sweeps[k] / gaps[k], 1.0) * follower.steady
+        if sweeps[k] > 0.0 and gaps[k] > 0.0:
+            part = min(sweeps[k] / gaps[k], 1.0)
+            during = follower.in_sweep(during, part, is_told=odometry is not None)
         count = 0
         if usable[k]:
             count = scan_lines(
