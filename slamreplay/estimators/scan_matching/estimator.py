@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from typing import ClassVar, Self
 
 import numpy as np
@@ -24,6 +24,9 @@ from slamreplay.estimators.start import OFFSET, ROTATE, Start, starts
 from slamreplay.geometry import se2
 from slamreplay.geometry.covariance import turned
 
+#: Settings a perturbation may change: ratios of the covariances of odometry and of matches.
+PROCESS_NOISE, MEASUREMENT_NOISE = "process_noise_scale", "measurement_noise_scale"
+
 
 @dataclass(frozen=True)
 class ScanMatching:
@@ -38,9 +41,12 @@ class ScanMatching:
 
     config: MatchConfig = field(default_factory=MatchConfig)
 
+    parameter_names: ClassVar[frozenset[str]] = frozenset(f.name for f in fields(MatchConfig))
     name: ClassVar[str] = "scan_matching"
     needs: ClassVar[frozenset[str]] = frozenset({"scans"})
-    settings: ClassVar[frozenset[str]] = frozenset({OFFSET, ROTATE})
+    settings: ClassVar[frozenset[str]] = frozenset(
+        {OFFSET, ROTATE, PROCESS_NOISE, MEASUREMENT_NOISE}
+    )
     without_noise: ClassVar[str] = "what a match weighs is measured on the log, not told"
 
     @classmethod
@@ -64,7 +70,10 @@ class ScanMatching:
         """
         scans = need_scans(view, self.name)
         odometry = odometry_track(view)
-        local = local_trajectory(scans, odometry, self.config)
+        config = self.config.scaled(
+            view.settings.get(PROCESS_NOISE, 1.0), view.settings.get(MEASUREMENT_NOISE, 1.0)
+        )
+        local = local_trajectory(scans, odometry, config)
         if not len(local.nodes):
             raise NotApplicableError("no scan has enough points to be matched", where=self.name)
         frame, T_frame_local, start = _placed(view, local, odometry)
