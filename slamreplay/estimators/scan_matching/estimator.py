@@ -12,7 +12,7 @@ from slamreplay.bundle.odometry import odometry_track
 from slamreplay.bundle.run import Estimate
 from slamreplay.bundle.track import PoseTrack
 from slamreplay.bundle.view import BundleView
-from slamreplay.errors import NotApplicableError
+from slamreplay.errors import NotApplicableError, UsageError
 from slamreplay.estimators.inputs import need_scans
 from slamreplay.estimators.parameters import settings_from
 from slamreplay.estimators.scan_matching.config import MatchConfig
@@ -56,7 +56,13 @@ class ScanMatching:
         Raises:
             UsageError: one that there is not, or a value that it cannot take.
         """
-        return cls(settings_from(MatchConfig, given, where=cls.name))
+        config = settings_from(MatchConfig, given, where=cls.name)
+        for name in sorted(cls.parameter_names - {"icp"}):
+            if not getattr(config, name) > 0.0:
+                raise UsageError(
+                    f"'{name}' is {getattr(config, name)}: it should be more than 0", where=cls.name
+                )
+        return cls(config)
 
     def run(self, view: BundleView, *, seed: int) -> Estimate:  # noqa: ARG002 - nothing is random
         """One row per scan, NaN before the start and the first scan with enough points.

@@ -9,6 +9,7 @@ import numpy as np
 
 from slamreplay.estimators.scan_matching import fusion, rescue
 from slamreplay.estimators.scan_matching.config import MatchConfig
+from slamreplay.estimators.scan_matching.fit import Fit
 from slamreplay.geometry import se2
 from slamreplay.matching.field import ScoreField
 from slamreplay.matching.line_map import LineMap, align
@@ -43,32 +44,6 @@ MOST_STEPS = 20
 
 
 _LIKELY = (fusion.LIKELY_FACTOR, fusion.LIKELY_FACTOR_YAW, fusion.FIRST_SCANS)
-
-
-@dataclass(frozen=True, eq=False)
-class Fit:
-    """How a scan came to its pose: rows of the ledger.
-
-    Attributes:
-        pose: (3,).
-        residual: (3,) match minus prediction; NaN where nothing was matched.
-        S: (3, 3) its covariance.
-        score: 0 to 1; NaN where nothing was matched.
-        accepted: whether the match was used.
-        moved: (3,) pose minus prediction.
-    """
-
-    pose: se2.Array
-    residual: se2.Array
-    S: se2.Array
-    score: float
-    accepted: bool
-    moved: se2.Array
-
-    @property
-    def is_matched(self) -> bool:
-        """Whether there was enough to match."""
-        return self.score == self.score
 
 
 @dataclass(eq=False)
@@ -271,7 +246,8 @@ class Follower:
         self.lost = 0
         (x, y, yaw), c, s = _off(pose, self.pose), np.cos(self.pose[2]), np.sin(self.pose[2])
         self.motion = np.array([c * x + s * y, c * y - s * x, yaw])
-        self.unsaid += STEADY_RATE * (self.motion - self._step - self.unsaid)
+        unsaid = np.clip(self.motion - self._step, -_MOST_UNSAID, _MOST_UNSAID)
+        self.unsaid += STEADY_RATE * (unsaid - self.unsaid)
         self.pose = pose
         S = told[3:12].reshape(3, 3).copy()
         return Fit(pose, told[:3].copy(), S, score, accepted=True, moved=moved)
@@ -299,5 +275,7 @@ def _off(pose: se2.Array, other: se2.Array) -> se2.Array:
     return off
 
 
+#: Odometry that begins anew tells of nothing that happened, m, m and rad.
+_MOST_UNSAID = np.array([0.5, 0.5, 0.5])
 _LEAST = np.array([fusion.LEAST_M, fusion.LEAST_RAD])
 _JITTER = np.array([JITTER_M, JITTER_RAD])
