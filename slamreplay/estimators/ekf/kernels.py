@@ -1,9 +1,9 @@
 """The filter's loop over events, compiled; tests hold each step against estimators.kalman.
 
 The state is x, y, yaw; for each of the `slots` the lasting errors of one thing: of its range (as a
-share of it) and of its bearing; and last, where there is one, the bias of the gyroscope in rad/s.
-A thing that is seen again takes its own slot, a new one a free slot or the one not seen for
-longest.
+share of it) and of its bearing; and last, where there is a gyroscope, by how much wheels tell turns
+too small, as a share of them (a wrong wheel base), and its bias in rad/s. A thing seen once more
+takes its own slot, a new one a free slot or the one not seen for longest.
 
 One module, longer than most: numba keeps a compiled caller though a function that it calls from
 another file has changed.
@@ -104,6 +104,27 @@ def fade(x, P, end, keep, variance):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
+def scale_turn(x, P, yaw, step):  # type: ignore[no-untyped-def]
+    """Correct a predicted step (3,) by the share that wheels lack of turns, in place.
+
+    The turn is spread evenly along the step, so that half of what it lacks turns the way itself.
+    """
+    n = len(x)
+    w = n - 2
+    cos, sin = np.cos(yaw), np.sin(yaw)
+    dx, dy = cos * step[0] - sin * step[1], sin * step[0] + cos * step[1]
+    by = np.array([-0.5 * step[2] * dy, 0.5 * step[2] * dx, step[2]])
+    for r in range(3):
+        x[r] += by[r] * x[w]
+        for j in range(n):
+            P[r, j] += by[r] * P[w, j]
+    for r in range(3):
+        for i in range(n):
+            P[i, r] += by[r] * P[i, w]
+    x[2] = wrapped(x[2])
+
+
+@njit(cache=True)
 def turn_by_gyro(x, P, yaw, step, Q, turned, variance, dt, gate, out):  # type: ignore[no-untyped-def]
     """Hold the turn of the wheels in a step against the gyroscope's, and take both in, in place.
 
@@ -112,21 +133,24 @@ def turn_by_gyro(x, P, yaw, step, Q, turned, variance, dt, gate, out):  # type: 
     chapter 8). Where the two contradict each other the gyroscope is believed, for wheels slip
     (gyrodometry, Borenstein and Feng 1996), and the way of that step is as uncertain as it is long.
 
-    Args: state and covariance as `predict` left them, the heading before, the step (3,) with its
-    covariance Q (3, 3), the gyroscope's integral `turned` over `dt` seconds and its variance, bias
-    apart, and the largest NIS of wheels that agree. `out` (2,) becomes residual (wheels minus
-    gyroscope) and its variance. Returns ACCEPTED or REJECTED, of the turn of the wheels.
+    Args: state and covariance as `predict` and `scale_turn` left them, the heading before, the step
+    (3,) as the wheels tell it with its covariance Q (3, 3), the gyroscope's integral `turned` over
+    `dt` seconds and its variance, bias apart, and the largest NIS of wheels that agree. `out` (2,)
+    becomes residual (wheels minus gyroscope) and its variance. Returns ACCEPTED or REJECTED, of the
+    turn of the wheels.
     """
     n = len(x)
-    b = n - 1
-    gap = wrapped(step[2] - (turned - x[b] * dt))
-    S = Q[2, 2] + dt * dt * P[b, b] + variance
-    out[0], out[1] = gap, S
+    w, b = n - 2, n - 1
+    gap = wrapped((1.0 + x[w]) * step[2] - (turned - x[b] * dt))
     cos, sin = np.cos(yaw), np.sin(yaw)
     cross = np.zeros(n)
     cross[0] = cos * Q[0, 2] - sin * Q[1, 2]
     cross[1] = sin * Q[0, 2] + cos * Q[1, 2]
     cross[2] = Q[2, 2]
+    for i in range(n):
+        cross[i] += P[i, w] * step[2] + P[i, b] * dt
+    S = Q[2, 2] + variance + (cross[w] * step[2] + cross[b] * dt)
+    out[0], out[1] = gap, S
     status = ACCEPTED
     if gap * gap > gate * S:
         status = REJECTED
@@ -138,8 +162,6 @@ def turn_by_gyro(x, P, yaw, step, Q, turned, variance, dt, gate, out):  # type: 
         P[0, 1] += dx * dy
         P[1, 0] += dx * dy
         P[1, 1] += dy * dy
-    for i in range(n):
-        cross[i] += P[i, b] * dt
     for i in range(n):
         x[i] -= cross[i] / S * gap
     x[2] = wrapped(x[2])
@@ -433,6 +455,7 @@ def run(  # type: ignore[no-untyped-def]  # noqa: C901 - the filter's loop
             if end > 3 and t_ns[e] > t_ns[e - 1]:
                 fade(x, P, end, np.exp((t_ns[e - 1] - t_ns[e]) * 1e-9 / lasting_s), lasting)
             if n > end and t_ns[e] > t_ns[e - 1]:
+                scale_turn(x, P, yaw, steps[e])
                 dt = (t_ns[e] - t_ns[e - 1]) * 1e-9
                 P[n - 1, n - 1] += bias_walk * dt
                 if np.isfinite(turns[e]):
