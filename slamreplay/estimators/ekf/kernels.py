@@ -31,6 +31,14 @@ def wrapped(angle):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
+def clear(H):  # type: ignore[no-untyped-def]
+    """Fill a matrix with zeros."""
+    for i in range(H.shape[0]):
+        for j in range(H.shape[1]):
+            H[i, j] = 0.0
+
+
+@njit(cache=True)
 def of_moving(things, count, driven, turned, least_m, least_rad):  # type: ignore[no-untyped-def]
     """(M,) which sightings come after some motion since the last one of the same thing.
 
@@ -113,14 +121,18 @@ def scale_turn(x, P, yaw, step):  # type: ignore[no-untyped-def]
     w = n - 2
     cos, sin = np.cos(yaw), np.sin(yaw)
     dx, dy = cos * step[0] - sin * step[1], sin * step[0] + cos * step[1]
-    by = np.array([-0.5 * step[2] * dy, 0.5 * step[2] * dx, step[2]])
-    for r in range(3):
-        x[r] += by[r] * x[w]
-        for j in range(n):
-            P[r, j] += by[r] * P[w, j]
-    for r in range(3):
-        for i in range(n):
-            P[i, r] += by[r] * P[i, w]
+    by_x, by_y, by_yaw = -0.5 * step[2] * dy, 0.5 * step[2] * dx, step[2]
+    x[0] += by_x * x[w]
+    x[1] += by_y * x[w]
+    x[2] += by_yaw * x[w]
+    for j in range(n):
+        P[0, j] += by_x * P[w, j]
+        P[1, j] += by_y * P[w, j]
+        P[2, j] += by_yaw * P[w, j]
+    for i in range(n):
+        P[i, 0] += by_x * P[i, w]
+        P[i, 1] += by_y * P[i, w]
+        P[i, 2] += by_yaw * P[i, w]
     x[2] = wrapped(x[2])
 
 
@@ -174,7 +186,7 @@ def turn_by_gyro(x, P, yaw, step, Q, turned, variance, dt, gate, out):  # type: 
 @njit(cache=True)
 def of_point(x, lever, H, expected):  # type: ignore[no-untyped-def]
     """Where a point at `lever` (2,) in the base should be: fills in `expected` (2,), H (2, n)."""
-    H[:, :] = 0.0
+    clear(H)
     cos, sin = np.cos(x[2]), np.sin(x[2])
     off_x, off_y = cos * lever[0] - sin * lever[1], sin * lever[0] + cos * lever[1]
     expected[0], expected[1] = x[0] + off_x, x[1] + off_y
@@ -188,7 +200,7 @@ def of_near(x, place, m, H, expected):  # type: ignore[no-untyped-def]
 
     Fills in `expected` (m,) and H (m, n); `place` (3,) is the thing's.
     """
-    H[:, :] = 0.0
+    clear(H)
     if m == 3:
         for r in range(3):
             expected[r] = x[r]
@@ -207,7 +219,7 @@ def measurement(x, place, slot, m, H, expected):  # type: ignore[no-untyped-def]
 
     Both are filled in: range (with its lasting error), bearing, and for m = 3 the heading.
     """
-    H[:, :] = 0.0
+    clear(H)
     away_x, away_y = place[0] - x[0], place[1] - x[1]
     reach = max(np.hypot(away_x, away_y), NEAREST_M)
     share = x[slot] if slot > 0 else 0.0
@@ -232,7 +244,8 @@ def times_rows(P, H, m, out):  # type: ignore[no-untyped-def]
     """Fill in `out` (m, n) with H P for the first m rows of a sparse H (m, n)."""
     n = P.shape[0]
     for r in range(m):
-        out[r, :] = 0.0
+        for j in range(n):
+            out[r, j] = 0.0
         for i in range(n):
             if H[r, i] != 0.0:
                 for j in range(n):
@@ -357,8 +370,8 @@ def slot_of(thing, holder, seen, x, P, variance):  # type: ignore[no-untyped-def
     at = 3 + 2 * oldest
     for i in range(at, at + 2):
         x[i] = 0.0
-        P[i, :] = 0.0
-        P[:, i] = 0.0
+        for j in range(len(x)):
+            P[i, j] = P[j, i] = 0.0
         P[i, i] = variance[i - at]
     return at
 
@@ -375,7 +388,8 @@ def take_in(k, m, gate, R, residual, x, P, H, HP, S, L, residual_out, S_out, mov
         residual_out[k, r] = residual[r]
         for c in range(m):
             S_out[k, r, c] = S[r, c]
-    moved_out[k, :] = 0.0
+    for r in range(3):
+        moved_out[k, r] = 0.0
     if not lower(S, m, L) or squared(L, residual, m) > gate:
         return REJECTED
     before_x, before_y, before_yaw = x[0], x[1], x[2]
@@ -459,17 +473,21 @@ def run(  # type: ignore[no-untyped-def]  # noqa: C901 - the filter's loop
                 dt = (t_ns[e] - t_ns[e - 1]) * 1e-9
                 P[n - 1, n - 1] += bias_walk * dt
                 if np.isfinite(turns[e]):
-                    before[:] = x[:3]
+                    for r in range(3):
+                        before[r] = x[r]
                     turn_status_out[e] = turn_by_gyro(
                         x, P, yaw, steps[e], Q[e], turns[e], turn_variance[e], dt, gates[1],
                         turn_out[e],
                     )  # fmt: skip
-                    turn_moved_out[e] = x[:3] - before
+                    for r in range(3):
+                        turn_moved_out[e, r] = x[r] - before[r]
                     turn_moved_out[e, 2] = wrapped(turn_moved_out[e, 2])
         s, k = measured[e], row[e]
         if k >= 0:
-            xyyaw_out[k] = x[:3]
-            cov_out[k] = P[:3, :3]
+            for r in range(3):  # slices would be shorter, and take far longer to compile
+                xyyaw_out[k, r] = x[r]
+                for c in range(3):
+                    cov_out[k, r, c] = P[r, c]
             updated_out[k] = lost[2]
             lost[2] = 0
         if s < 0:
