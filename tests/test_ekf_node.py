@@ -285,6 +285,9 @@ def test_a_localizers_pose_as_an_input_in_the_map_and_a_truth_never():
     off = estimate.track.xyyaw - true
     assert np.hypot(*off[100:, :2].T).max() < 0.1
     assert {i.source for i in estimate.innovations} == {"pose0 pose", "odom0 twist"}
+    lost = node({"odom0": "/odom", "odom0_config": VELOCITIES, "base_link_frame": "hull"})
+    with pytest.raises(NotApplicableError, match=r"odom0 /odom.*tf leads to neither hull"):
+        lost.run(LOG.view(), seed=0)
     judged = node({"pose0": "/truth", "pose0_config": POSE})
     with pytest.raises(NotApplicableError, match=r"pose0 /truth.*the log has .*/odom"):
         judged.run(LOG.view(), seed=0)
