@@ -114,7 +114,7 @@ def close_loops(
         match_scale: ratio by which covariances of matches are changed.
         with_cov: whether the covariance of each belief is worked out.
     """
-    closer = _Closer(maps, OnlineGraph(first, first_cov), config, match_scale)
+    closer = Closer(maps, OnlineGraph(first, first_cov), config, match_scale)
     belief, cov = [first], [first_cov]
     for new in range(1, len(maps)):
         closer.take(new)
@@ -130,17 +130,24 @@ def close_loops(
     )
 
 
-class _Closer:
-    """The graph of submaps as it grows, and the closures that wait for others to confirm them."""
+class Closer:
+    """The graph of submaps as it grows, and the closures that wait for others to confirm them.
+
+    Args:
+        maps: the submaps.
+        graph: holds the first one.
+        config: hyper-parameters.
+        match_scale: ratio by which covariances of matches are changed.
+    """
 
     def __init__(
-        self, maps: Submaps, graph: OnlineGraph, config: GraphConfig, match_scale: float
+        self, maps: Submaps, graph: OnlineGraph, config: GraphConfig, match_scale: float = 1.0
     ) -> None:
         self.maps, self.graph, self.config, self.match_scale = maps, graph, config, match_scale
         self.poses = graph.poses
         self.candidates: dict[int, Candidate] = {}  # by the new submap
         self.loosened = np.ones(len(maps) - 1)
-        self._told: list[float] = []  # NIS of good matches, had the motions erred as they say
+        self.told: list[float] = []  # NIS of good matches, had the motions erred as they say
         self._waiting: list[int] = []
         self._searcher = Searcher()
         self._last = maps.way[maps.stops[1:] - 1]  # way to the last node of each
@@ -152,9 +159,9 @@ class _Closer:
         The median of their NIS over what it should be, so that a single slip does not count; never
         less than 1, for where matches err most themselves they tell nothing.
         """
-        if len(self._told) < ENOUGH:
+        if len(self.told) < ENOUGH:
             return 1.0
-        return float(np.clip(np.median(self._told) / MEDIAN, 1.0, MOST_RATIO))
+        return float(np.clip(np.median(self.told) / MEDIAN, 1.0, MOST_RATIO))
 
     def take(self, new: int) -> None:
         """Add a submap to the graph, and look for it."""
@@ -212,7 +219,7 @@ class _Closer:
         S = relative * self.ratio + cov
         nis = float(residual @ np.linalg.solve(S, residual))
         if place.score >= self.config.min_score:
-            self._told.append(float(residual @ np.linalg.solve(relative + cov, residual)))
+            self.told.append(float(residual @ np.linalg.solve(relative + cov, residual)))
         return Candidate(on, new, z, cov, place.score, residual, S, nis, float(poses[on, 2]))
 
     def _judge(self, found: Candidate, *, is_sure: bool) -> None:
