@@ -39,14 +39,16 @@ def every_pose(field, points, window, step, *, whole_turn=False):
         headings = window.centre[2] + 2.0 * np.pi / count * np.arange(count)
     corner = window.centre[:2] - sides * field.resolution_m - field.corner_xy
     scores = np.zeros((len(headings), 2 * sides[1] + 1, 2 * sides[0] + 1))
-    height, width = field.values.shape
-    rows, cols = np.indices(scores.shape[1:])
+    height, width = scores.shape[1:]
     for k, heading in enumerate(headings):
         turned = se2.transform_points(np.array([*corner, heading]), points) / field.resolution_m
-        for col, row in np.floor(turned).astype(int):
-            r, c = rows + row, cols + col
-            inside = (r >= 0) & (r < height) & (c >= 0) & (c < width)
-            scores[k] += np.where(inside, field.values[r % height, c % width], 0.0)
+        cells = np.floor(turned).astype(int)
+        # A margin of nothing on all sides, as wide as points or poses may lie outside.
+        low, high = -cells.min(axis=0).clip(max=0), cells.max(axis=0).clip(min=0)
+        margin = ((low[1], high[1] + height), (low[0], high[0] + width))
+        whole = np.pad(field.values.astype(np.float64), margin)
+        for col, row in cells + low:
+            scores[k] += whole[row : row + height, col : col + width]
     return scores / len(points)
 
 
@@ -99,6 +101,28 @@ def test_the_optimum_is_found_in_noise_that_holds_no_pose(seed, coarse, step):
         assert every_pose(field, points, window, step or heading_step(points, 0.1)).max() == 0.0
     else:
         check(field, pyramid(field), points, window, step)
+
+
+@pytest.mark.parametrize("step", [0.004, 0.02, 0.1])
+@pytest.mark.parametrize("worth", [0, 10**9])
+def test_bounds_of_nodes_are_no_less_than_any_of_their_poses(monkeypatch, step, worth):
+    monkeypatch.setattr(branch_and_bound, "_WORTH_ADDING", worth)  # together or one by one
+    rng = np.random.default_rng(4)
+    values = np.where(rng.random((90, 120)) < 0.02, rng.random((90, 120)), 0.0)
+    field = ScoreField(values.astype(np.float32), 0.05, np.zeros(2))
+    bounds, points = pyramid(field), rng.normal(0.0, 1.5, (40, 2))
+    window = PoseWindow(np.array([3.0, 2.2, 0.4]), (1.0, 0.8), 20 * step)
+    lattice = branch_and_bound._lattice(field, points, window, step)
+    search = branch_and_bound._search(bounds, lattice)
+    scores = every_pose(field, points, window, step) * len(points)
+    assert lattice.longest_run == {0.004: 8, 0.02: 4, 0.1: 2}[step]
+    for level in range(1, 4):
+        tops = branch_and_bound._bound_tops(bounds, search, level) / BYTE
+        run, square = min(1 << level, lattice.longest_run), 1 << level
+        for k, i, j in np.ndindex(scores.shape):
+            assert tops[k // run, i // square, j // square] >= scores[k, i, j] - 1e-9
+    # They are bounds, and not far ones: no more than a point's score per cell they span.
+    assert tops.max() < 0.8 * len(points)
 
 
 def test_more_points_than_a_sum_of_bytes_holds():

@@ -27,13 +27,17 @@ from slamreplay.testing.synthetic_rows import table_of
 
 WIDE = gates_of(1.0 - 1e-12)
 #: Of the sensors alone: nothing for clocks and scales that are exact here.
-TOLD = replace(EXACT, gyro_per_root_s=0.003, gyro_per_turn=0.0, gyro_clock_s=0.0, gyro_bias=0.003)
+TOLD = replace(
+    EXACT, gyro_per_root_s=0.003, gyro_per_turn=0.0, gyro_clock_s=0.0, gyro_bias=0.003,
+    wheel_turn=0.05,
+)  # fmt: skip
 
 
 def blind(seed, noise=TOLD, seconds=20.0):
     """A robot that sees nothing, with a gyroscope whose bias walks, and its true poses."""
-    evidence, truth = world(seed, noise, seconds)
     rng = np.random.default_rng(seed + 1000)
+    wheels = 1.0 + noise.wheel_turn * rng.standard_normal()
+    evidence, truth = world(seed, replace(noise, turn_ratio=wheels), seconds)
     dt = np.diff(evidence.row_ns) / 1e9
     walk = noise.gyro_bias_per_root_s * np.sqrt(dt) * rng.standard_normal(len(dt))
     bias = noise.gyro_bias * rng.standard_normal() + np.cumsum(walk)
@@ -54,27 +58,39 @@ def last_nees(out, truth):
 @pytest.mark.parametrize("seed", range(3))
 def test_the_turn_equals_a_kalman_filter_that_has_the_noise_of_the_step_in_its_state(seed):
     rng = np.random.default_rng(seed)
-    A = rng.standard_normal((4, 4))
-    P, B = A @ A.T + 0.1 * np.eye(4), rng.standard_normal((3, 3))
-    Q, x = 0.1 * B @ B.T, rng.normal(0.0, 0.3, 4)
+    A = rng.standard_normal((5, 5))
+    P, B = A @ A.T + 0.1 * np.eye(5), rng.standard_normal((3, 3))
+    Q, x = 0.1 * B @ B.T, rng.normal(0.0, 0.3, 5)
+    x[3] = 0.0  # what wheels lack turns the way to first order only
     step, dt, turned, variance = np.array([0.4, 0.1, 0.3]), 0.2, 0.25, 0.01
 
-    prior, P_prior = x.copy(), P.copy()
-    kernels.predict(prior, P_prior, step, Q)
+    def moved(state):
+        """The step with its turn longer by the share of it that wheels lack."""
+        lack = state[3] * step[2]
+        c, s = np.cos(state[2]), np.sin(state[2])
+        way = np.array([c * step[0] - s * step[1], s * step[0] + c * step[1]])
+        left = np.array([-way[1], way[0]])
+        return np.append(state[:2] + way + 0.5 * lack * left, [state[2] + step[2] + lack,
+                                                               *state[3:]])  # fmt: skip
+
+    F = np.column_stack([(moved(x + e) - moved(x - e)) / 2e-6 for e in 1e-6 * np.eye(5)])
     cos, sin = np.cos(x[2]), np.sin(x[2])
-    G = np.zeros((4, 3))
+    G = np.zeros((5, 3))
     G[:3, :3] = [[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]]
+    P_prior = F @ P @ F.T + G @ Q @ G.T
     whole = np.block([[P_prior, G @ Q], [Q @ G.T, Q]])  # state, and noise of this step
-    H = np.array([[0.0, 0.0, 0.0, dt, 0.0, 0.0, 1.0]])
-    gap = np.array([turned - step[2] - prior[3] * dt])
-    oracle = kalman.correct(np.append(prior, np.zeros(3)), whole, gap, H, [[variance]])
+    H = np.array([[0.0, 0.0, 0.0, step[2], dt, 0.0, 0.0, 1.0]])
+    gap = np.array([turned - (1.0 + x[3]) * step[2] - x[4] * dt])
+    oracle = kalman.correct(np.append(moved(x), np.zeros(3)), whole, gap, H, [[variance]])
 
     yaw, out = x[2], np.zeros(2)
-    status = kernels.turn_by_gyro(prior, P_prior, yaw, step, Q, turned, variance, dt, 1e9, out)
+    kernels.predict(x, P, step, Q)
+    kernels.scale_turn(x, P, yaw, step)
+    status = kernels.turn_by_gyro(x, P, yaw, step, Q, turned, variance, dt, 1e9, out)
     assert status == kernels.ACCEPTED
-    np.testing.assert_allclose(prior, oracle.x[:4], atol=1e-12)
-    np.testing.assert_allclose(P_prior, oracle.P[:4, :4], atol=1e-12)
-    np.testing.assert_allclose(out, [-gap[0], oracle.S[0, 0]])
+    np.testing.assert_allclose(x, oracle.x[:5], atol=1e-7)
+    np.testing.assert_allclose(P, oracle.P[:5, :5], atol=1e-6)
+    np.testing.assert_allclose(out, [-gap[0], oracle.S[0, 0]], atol=1e-6)
 
 
 def test_consistent_noise_gives_nees_and_nis_within_their_intervals():
@@ -88,7 +104,7 @@ def test_consistent_noise_gives_nees_and_nis_within_their_intervals():
     low, high = chi2.ppf([0.025, 0.975], 3 * runs) / runs
     assert low < np.mean(last) < high
     assert np.mean(nis) == pytest.approx(1.0, abs=0.02)
-    half = replace(TOLD, gyro_bias=0.0015)
+    half = replace(TOLD, gyro_bias=0.0015, wheel_turn=0.025)
     sure = [last_nees(filtered(e, half, WIDE, 0.25), t)
             for e, t, _ in (blind(seed) for seed in range(20))]  # fmt: skip
     assert np.mean(sure) > chi2.ppf(0.975, 60) / 20
@@ -112,12 +128,29 @@ def test_a_robot_at_rest_learns_the_bias_and_keeps_its_heading_after():
     alone = filtered(replace(rested, gyro=None), told, WIDE)
     restless = filtered(evidence, told, WIDE)
 
-    assert out.bias == pytest.approx(0.03, abs=0.005)
+    assert out.turns[1] == pytest.approx(0.03, abs=0.005)
     grown, wheels, turning = (o.cov[-1, 2, 2] - START_COV[2, 2] for o in (out, alone, restless))
     assert grown < 0.1 * wheels
     assert turning > 0.8 * wheels  # whoever always turns never sees a zero
     assert abs(se2.wrap_angle(out.xyyaw[-1, 2] - truth[-1, 2])) < 3.0 * out.cov[-1, 2, 2] ** 0.5
-    assert np.isnan(alone.bias)
+    assert np.isnan(alone.turns).all()
+
+
+def test_wheels_that_tell_every_turn_too_large_are_found_out():
+    """Skid steering: half of what the wheels say. Without the gyroscope the heading is lost."""
+    half = replace(TOLD, turn_ratio=0.5)
+    evidence, truth = world(4, half, 60.0)
+    turn = np.append(0.0, np.cumsum(se2.wrap_angle(np.diff(truth[:, 2]))))
+    zero, gaps = np.zeros(len(truth)), np.zeros(len(truth), dtype=np.int64)
+    gyro = Gyro(evidence.row_ns, turn, zero, np.full(len(truth), np.nan), gaps)
+    evidence = replace(evidence, observations=Observations.none(), gyro=gyro)
+    out = filtered(evidence, replace(TOLD, wheel_turn=0.02), gates_of(0.999))
+    alone = filtered(replace(evidence, gyro=None), TOLD, gates_of(0.999))
+
+    assert out.turns[0] == pytest.approx(-0.5, abs=0.15)
+    error = np.abs(se2.wrap_angle(out.xyyaw[:, 2] - truth[:, 2]))
+    assert error.max() < 0.6
+    assert np.abs(se2.wrap_angle(alone.xyyaw[:, 2] - truth[:, 2])).max() > 2.0
 
 
 def test_wheels_that_slip_in_a_turn_are_not_believed():
@@ -198,7 +231,8 @@ def test_a_unit_that_nothing_levels_is_left_out_and_one_of_headings_alone_is_not
     felt = with_imu(LOG).table("imu")["linear_acceleration_xyz"]
     floating = with_imu(LOG, linear_acceleration_xyz=np.zeros_like(felt))
     assert gyro_of(floating.view()) is None
-    assert "gyro_bias" not in Ekf().run(floating.view(), seed=0).scalars
+    scalars = Ekf().run(floating.view(), seed=0).scalars
+    assert ("gyro_bias" in scalars, scalars["imu_left_out"]) == (False, 1.0)
 
     t_s = np.arange(0.0, (LOG.manifest.end_ns - START_NS) / 1e9, 0.02)
     half = 0.5 * (true_path(t_s)[:, 2] - 1.0)

@@ -17,6 +17,7 @@ from slamreplay.estimators.ekf.node.measurements import parts_of
 from slamreplay.estimators.ekf.node.parameters import PLANAR, node_parameters
 from slamreplay.estimators.start import GLOBAL, OFFSET
 from slamreplay.geometry import se2
+from slamreplay.replay.parameters import configured, read_parameters
 from slamreplay.testing.synthetic import START_NS, synthetic_bundle, true_path
 from slamreplay.testing.synthetic_rows import pose_columns, table_of, tf_rows
 
@@ -284,6 +285,9 @@ def test_a_localizers_pose_as_an_input_in_the_map_and_a_truth_never():
     off = estimate.track.xyyaw - true
     assert np.hypot(*off[100:, :2].T).max() < 0.1
     assert {i.source for i in estimate.innovations} == {"pose0 pose", "odom0 twist"}
+    lost = node({"odom0": "/odom", "odom0_config": VELOCITIES, "base_link_frame": "hull"})
+    with pytest.raises(NotApplicableError, match=r"odom0 /odom.*tf leads to neither hull"):
+        lost.run(LOG.view(), seed=0)
     judged = node({"pose0": "/truth", "pose0_config": POSE})
     with pytest.raises(NotApplicableError, match=r"pose0 /truth.*the log has .*/odom"):
         judged.run(LOG.view(), seed=0)
@@ -361,3 +365,41 @@ def test_perturbations_reach_the_node_or_it_says_no():
     for given, setting in ((ODOM, OFFSET), (ODOM, GLOBAL), (in_map, GLOBAL)):
         with pytest.raises(NotApplicableError):
             node(given).run(LOG.view().with_setting(setting, 1.0), seed=0)
+
+
+ROS_2 = """
+/robot/ekf_filter_node:
+  ros__parameters:
+    frequency: 30.0
+    publish_tf: true
+    two_d_mode: true
+    odom0: /odom
+    odom0_config: [false, false, false, false, false, false, true, true, false, false, false, true,
+                   false, false, false]
+    odom0_queue_size: 10
+    use_control: false
+"""
+ROS_1 = """
+ekf_se_odom:
+  two_d_mode: true
+  odom0: odom
+  odom0_config: [false, false, false, false, false, false, true, true, false, false, false, true,
+                 false, false, false]
+  odom0_nodelay: true
+"""
+
+
+@pytest.mark.parametrize(("text", "live"), [(ROS_2, 4), (ROS_1, 1)])
+def test_files_of_both_ros_are_read_and_what_has_no_part_in_a_replay_is_told(text, live, tmp_path):
+    (tmp_path / "ekf.yaml").write_text(text, encoding="utf-8")
+    found = read_parameters([tmp_path / "ekf.yaml"], ["ekf", "dead_reckoning"])
+    made = configured("ekf", found.of["ekf"])
+
+    assert f"{live} of the live node" in found.told[0]
+    assert made.node.inputs[0].topic.strip("/") == "odom"
+    assert made.node == node_parameters(ODOM | {"odom0": made.node.inputs[0].topic})
+    (tmp_path / "ekf.yaml").write_text(
+        text.replace("odom0_config", "odom0_cnfig"), encoding="utf-8"
+    )
+    with pytest.raises(UsageError, match="did you mean 'odom0_config'"):
+        read_parameters([tmp_path / "ekf.yaml"], ["ekf"])

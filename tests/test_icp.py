@@ -28,11 +28,11 @@ def scan_at(pose, rng, noise_m=NOISE_M):
     return np.column_stack([reach * np.cos(BEARINGS), reach * np.sin(BEARINGS)])
 
 
-def corridor(rng, length_m=30.0):
+def corridor(rng, length_m=30.0, noise_m=NOISE_M):
     """Both walls of a corridor along x, 2 m wide, from its middle."""
     x = rng.uniform(-length_m / 2.0, length_m / 2.0, 600)
     side = rng.choice([-1.0, 1.0], 600)
-    return np.column_stack([x, side + rng.normal(0.0, NOISE_M, 600)])
+    return np.column_stack([x, side + rng.normal(0.0, noise_m, 600)])
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -67,12 +67,13 @@ def test_errors_are_as_large_as_the_covariance_says():
     assert 2.0 < np.mean(nees) < 4.5
 
 
-def test_along_a_corridor_the_guess_stays():
+@pytest.mark.parametrize("noise_m", [0.01, 0.03])
+def test_along_a_corridor_the_guess_stays(noise_m):
     rng = np.random.default_rng(3)
-    target = line_target(corridor(rng))
+    target = line_target(corridor(rng, noise_m=noise_m))
     guess = np.array([0.4, 0.1, 0.05])
 
-    found = icp(target, corridor(rng), guess)
+    found = icp(target, corridor(rng, noise_m=noise_m), guess)
 
     assert found.observed.tolist() == [False, True, True]
     assert abs(found.directions[0, 0]) > 0.999
@@ -214,7 +215,8 @@ def test_the_sums_are_compiled_once():
     points = scan_at((3.7, 6.1, 0.7), np.random.default_rng(0))
     icp(line_target(points), points, np.zeros(3))
 
-    assert len(_sum_up.signatures) == 1
+    # None where the whole came from the cache.
+    assert len(_sum_up.signatures) <= 1
 
 
 def test_open3d_finds_the_same_place():

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from slamreplay.geometry import se2
 from slamreplay.maps.grid import OccupancyGrid
-from slamreplay.maps.raycast import cast_rays
+from slamreplay.maps.raycast import _first_wall, cast_rays
 
 #: Along the axes and the diagonals, where crossings of rows and columns coincide.
 STRAIGHT = np.arange(-4, 5) * np.pi / 4.0
@@ -45,6 +45,18 @@ def test_rays_are_those_of_the_plain_walk(seed, walls, limit, turned, centred):
     found = cast_rays(grid, poses, bearings, limit)
 
     assert found.tobytes() == plain(grid, poses, bearings, limit).tobytes()
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_rays_through_corners_take_the_plain_walk_s_side(seed):
+    rng = np.random.default_rng(seed)
+    cells = np.where(rng.random((12, 12)) < 0.25, 100, 0).astype(np.int8)
+    grid = OccupancyGrid(cells, 1.0, np.zeros(3))
+    # No angle has a sine and cosine that are equal to the last bit.
+    for dx, dy in 0.70710678 * np.array([[1, 1], [1, -1], [-1, 1], [-1, -1]]):
+        for x, y in rng.integers(0, 12, (30, 2)) + rng.choice([0.0, 0.5]):
+            expected = plain_rays.first_wall(grid.occupied, x, y, dx, dy, 40.0)
+            assert _first_wall(grid.barred, x, y, dx, dy, 40.0) == expected
 
 
 def test_a_ray_that_is_not_a_number_finds_nothing():

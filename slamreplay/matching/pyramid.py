@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from slamreplay.matching.field import ScoreField
 
+# These are compiled into the kernels of branch_and_bound: numba does not see that they change.
 #: Squares have edges of 2, 4, 8, 16 and 32 cells; level 0 is the field itself.
 LEVELS = 5
 #: The longest run of headings that is bounded at once.
@@ -48,7 +49,7 @@ class Pyramid:
 
 
 def pyramid(field: ScoreField) -> Pyramid:
-    """The bounds of a field, 15 bytes a cell; making them costs about what one search costs."""
+    """The bounds of a field: 15 bytes for each cell of it and of its margin."""
     largest = 1 << LEVELS
     margin = 2 * largest
     height, width = (-(-(n + margin) // largest) * largest for n in field.values.shape)

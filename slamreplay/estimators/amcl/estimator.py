@@ -94,6 +94,7 @@ class Amcl:
         ledger = Ledger(scans.t_ns, T_odom_base, frame_id=view.manifest.frames.map or grid.frame_id)
 
         rows = known[known >= min(given, default=len(scans))]
+        driven = T_odom_base[rows]
         stops = [*np.flatnonzero(np.isin(rows, list(given))).tolist(), len(rows)]
         for at, end in pairwise(stops):
             start = given[int(rows[at])]
@@ -104,11 +105,11 @@ class Amcl:
             ledger.begin(int(rows[at]), start.xyyaw)
             here = at
             while here < end:
-                here += amcl.first_due(T_odom_base[rows[here:end]])
+                here += amcl.first_due(driven[here:end])
                 if here == end:
                     break
                 row = int(rows[here])
-                amcl.predict(T_odom_base[row])
+                amcl.predict(driven[here])
                 beams = _beams(config, scans, row)
                 if self.judge_scans:
                     returned = beams.returned
@@ -127,7 +128,7 @@ class Amcl:
             least, most = (max(1, round(ratio * n)) for n in (c.min_particles, c.max_particles))
             c = replace(c, min_particles=least, max_particles=most)
         words = (c.random_seed if c.random_seed >= 0 else seed,)
-        other = round(view.settings.get(RANDOM_SEED, 0.0))
+        other = round(view.settings.get(RANDOM_SEED, 0.0)) % 2**32
         return c, (*words, other) if other else words
 
 

@@ -13,12 +13,13 @@ from numba import njit
 from numpy.typing import NDArray
 
 from slamreplay.estimators.amcl.noise import cos_sin
+from slamreplay.estimators.amcl.vectors import LANES, cells_of_beams
 from slamreplay.geometry import se2
 from slamreplay.maps.grid import OccupancyGrid
 
 _TOP = 65535
 #: Beams are summed so many at a time; what is missing to a multiple of it ends here, off any map.
-_LANES, _NOWHERE = 16, 1e9
+_NOWHERE = 1e9
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +68,7 @@ class ScoreTable:
             ends: (2, M) ends of the beams in the base frame, m.
         """
         m = ends.shape[1]
-        missing = -m % _LANES
+        missing = -m % LANES
         padded = np.full((2, m + missing), _NOWHERE, dtype=np.float32)
         padded[:, :m] = ends
         padded[1, m:] = 0.0
@@ -115,45 +116,54 @@ def local_poses(particles, origin, per_m, out):  # type: ignore[no-untyped-def]
         out[3, i] = np.float32(per_m * sin)
 
 
-@njit(cache=True, fastmath={"contract", "nsz"}, error_model="numpy")
+@njit(cache=True, error_model="numpy")
 def score_sums(local, ends, cells, shift, height, width, out):  # type: ignore[no-untyped-def]
     """Fill (N,) with sums over M beams, a multiple of 16, of the cells they end in.
 
-    Args: local (4, N) of `local_poses`, ends (2, M) float32, cells flat uint16. Cells are found
-    some at a time: in whole numbers of 2^-shift rows, whose fraction is then masked off, so that a
-    row times its length costs no multiplication, and as unsigned numbers, of which negative ones
-    are large and so meet the border, too. Those of the particle before are looked up meanwhile, two
-    to a word: one keeps the arithmetic units busy and the other the loads.
+    Args: local (4, N) of `local_poses`, ends (2, M) float32, cells flat uint16. Cells are found 16
+    at a time: in whole numbers of 2^-shift rows, whose fraction is then masked off, so that a row
+    times its length costs no multiplication, and as unsigned numbers, of which negative ones are
+    large and so meet the border, too. Those of the particle before are looked up meanwhile, two to
+    a word: one keeps the arithmetic units busy and the other the loads.
     """
     n, beams = local.shape[1], ends.shape[1]
     found = np.zeros((2, beams // 2), dtype=np.uint64)
     index = found.view(np.uint32)
     us, vs = ends[0], ends[1]
     fraction = np.uint32((1 << shift) - 1)
-    rows = np.uint32(~fraction)
     last_row = np.uint32(((height - 1) << shift) | fraction)
-    last_col = np.uint32(width - 1)
+    border = (np.uint32(width - 1), last_row, np.uint32(~fraction))
     half, low = np.uint64(32), np.uint64(0xFFFFFFFF)
+    one, two, three, four = np.uint64(1), np.uint64(2), np.uint64(3), np.uint64(4)
+    five, six, seven, eight = np.uint64(5), np.uint64(6), np.uint64(7), np.uint64(8)
     scale = np.float32(1 << shift)
     words = np.uint64(beams // 2)  # unsigned indices: none is counted from the end
     for i in range(n + 1):
         k = min(i, n - 1)
-        x, y, cos, sin = local[0, k], local[1, k] * scale, local[2, k], local[3, k]
-        row_cos, row_sin = cos * scale, sin * scale
+        x, y, cos, sin = local[0, k], local[1, k], local[2, k], local[3, k]
+        pose = (x, cos, sin, y * scale, cos * scale, sin * scale)
         coming, here = index[i & 1], found[1 - (i & 1)]
         a, b, c, d = np.uint32(0), np.uint32(0), np.uint32(0), np.uint32(0)
-        for w in range(np.uint64(0), words, np.uint64(8)):
-            for j in range(16):
-                m = w + w + np.uint64(j)
-                col = np.uint32(np.int32(x + cos * us[m] - sin * vs[m]))
-                row = np.uint32(np.int32(y + row_sin * us[m] + row_cos * vs[m]))
-                coming[m] = (min(row, last_row) & rows) | min(col, last_col)
-            for j in range(0, 8, 2):
-                p, q = here[w + np.uint64(j)], here[w + np.uint64(j + 1)]
-                a = np.uint32(a + cells[p & low])
-                b = np.uint32(b + cells[p >> half])
-                c = np.uint32(c + cells[q & low])
-                d = np.uint32(d + cells[q >> half])
+        for w in range(np.uint64(0), words, eight):
+            cells_of_beams(coming, w + w, us, vs, pose, border)
+            p, q, r, s = here[w], here[w + one], here[w + two], here[w + three]
+            a = np.uint32(a + cells[p & low])
+            b = np.uint32(b + cells[p >> half])
+            c = np.uint32(c + cells[q & low])
+            d = np.uint32(d + cells[q >> half])
+            a = np.uint32(a + cells[r & low])
+            b = np.uint32(b + cells[r >> half])
+            c = np.uint32(c + cells[s & low])
+            d = np.uint32(d + cells[s >> half])
+            p, q, r, s = here[w + four], here[w + five], here[w + six], here[w + seven]
+            a = np.uint32(a + cells[p & low])
+            b = np.uint32(b + cells[p >> half])
+            c = np.uint32(c + cells[q & low])
+            d = np.uint32(d + cells[q >> half])
+            a = np.uint32(a + cells[r & low])
+            b = np.uint32(b + cells[r >> half])
+            c = np.uint32(c + cells[s & low])
+            d = np.uint32(d + cells[s >> half])
         if i > 0:
             out[i - 1] = np.int64(a) + np.int64(b) + np.int64(c) + np.int64(d)
 

@@ -209,8 +209,9 @@ class AmclFilter:
         drawn = np.empty((3, n))
         kernels.draw(particles, weights, start_draw, drawn)
         self._particles, self._weights = drawn, np.full(n, 1.0 / n)
-        off = np.abs(drawn[:2] - drawn[:2].mean(axis=1, keepdims=True))
-        self._is_converged = bool(off.max() <= _CONVERGED_M)
+        if c.do_beamskip:  # nothing else asks
+            off = np.abs(drawn[:2] - drawn[:2].mean(axis=1, keepdims=True))
+            self._is_converged = bool(off.max() <= _CONVERGED_M)
 
     def _anywhere(self, n: int) -> se2.Array:
         free = np.argwhere(self._grid.free)

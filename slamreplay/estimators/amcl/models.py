@@ -114,8 +114,10 @@ class FieldProb:
     ) -> None:
         self._config = config
         self._logs = BeamScores(config, grid, distance_m, None)
-        near = np.pad(distance_m < config.beam_skip_distance, 1)
-        self._near = ScoreTable.of(near.astype(np.float64), grid)
+        self._near: ScoreTable | None = None
+        if config.do_beamskip:
+            near = np.pad(distance_m < config.beam_skip_distance, 1)
+            self._near = ScoreTable.of(near.astype(np.float64), grid)
 
     def __call__(
         self, particles: se2.Array, beams: Beams, *, is_converged: bool
@@ -123,14 +125,17 @@ class FieldProb:
         """Likelihood (N,) of a scan at particles (3, N), and the log of a common factor."""
         table = self._logs.of(beams)
         local, ends = table.local(particles), beams.ends
-        if self._config.do_beamskip and is_converged and len(beams):
-            ends = np.ascontiguousarray(ends[:, self._kept(local, ends)])
+        if self._near is not None and is_converged and len(beams):
+            ends = np.ascontiguousarray(ends[:, self._kept(self._near, local, ends)])
         logs = table.sums(local, ends)
         top = float(logs.max())
         return np.exp(logs - top), top
 
-    def _kept(self, local: NDArray[np.float32], ends: se2.Array) -> NDArray[np.bool_]:
-        c, near = self._config, self._near
+    def _kept(
+        self, near: ScoreTable, local: NDArray[np.float32], ends: se2.Array
+    ) -> NDArray[np.bool_]:
+        """(M,) which beams enough particles explain; all where hardly any are."""
+        c = self._config
         count = np.empty(ends.shape[1], dtype=np.int64)
         fits(
             local,

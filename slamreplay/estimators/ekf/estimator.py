@@ -105,8 +105,10 @@ class Ekf:
         """One row per scan (per odometry sample without scans), NaN where there is no pose.
 
         Diagnostics: `updated` (1 where a sighting or fix was taken in since the row before).
-        Scalars: measurements by what became of them, how often the filter placed itself, and the
-        bias of the gyroscope at the end, `gyro_bias`, rad/s.
+        Scalars: measurements by what became of them, how often the filter placed itself, and with a
+        gyroscope what was found at the end: its bias, `gyro_bias` in rad/s, and by which share of
+        them wheels tell turns too small, `wheels_lack_of_turns`; `imu_left_out` is 1 where an
+        inertial unit measures no turns, or nothing says which way is up in it.
 
         Raises:
             NotApplicableError: no odometry; or it is to start anywhere, and has no sighting of
@@ -231,7 +233,10 @@ def estimate_of(view: BundleView, evidence: Evidence, done: Filtered) -> Estimat
     if evidence.fixes is not None:
         scalars |= _counts("fixes", done.fixed)
     if evidence.gyro is not None:
-        scalars |= {**_counts("wheel_turns", done.turned), "gyro_bias": done.bias}
+        found = dict(zip(("wheels_lack_of_turns", "gyro_bias"), done.turns.tolist(), strict=True))
+        scalars |= {**_counts("wheel_turns", done.turned), **found}
+    elif view.role("imu") is not None:
+        scalars["imu_left_out"] = 1.0
     innovations = _innovations(evidence, done, track.frame_id, base)
     return Estimate(track, innovations, {"updated": done.updated}, scalars)
 

@@ -28,6 +28,9 @@ LOST_LEAST, LOST_NS = 5, 10 * NS_PER_S
 SLOTS = 8
 
 
+#: Wheels' share of turns and gyroscope's bias (2,), with their covariance (2, 2).
+_Turns = tuple[se2.Array, se2.Array]
+
 _NEVER = np.iinfo(np.int64).min
 
 
@@ -63,17 +66,17 @@ class _State:
 
     @classmethod
     def at(
-        cls, pose: se2.Array, cov: se2.Array, lasting: se2.Array, bias: tuple[float, float] | None
+        cls, pose: se2.Array, cov: se2.Array, lasting: se2.Array, turns: _Turns | None
     ) -> _State:
-        """At a pose, with nothing known of lasting errors, and a bias (rad/s) with its variance."""
+        """At a pose, with nothing known of lasting errors, and what is known of turns."""
         slots = SLOTS if lasting.any() else 0
-        n = 3 + 2 * slots + (bias is not None)
+        n = 3 + 2 * slots + 2 * (turns is not None)
         x, P = np.zeros(n), np.zeros((n, n))
         x[:3], P[:3, :3] = pose, cov
         errors = np.arange(3, 3 + 2 * slots)
         P[errors, errors] = np.tile(lasting, slots)
-        if bias is not None:
-            x[-1], P[-1, -1] = bias
+        if turns is not None:
+            x[-2:], P[-2:, -2:] = turns
         nobody = np.full(slots, -1, dtype=np.int64)
         return cls(x, P, nobody, nobody.copy())
 
@@ -175,7 +178,8 @@ class _Pass:
         self.updated = np.full(N, np.nan)
         self.turned = Held.none(self.events.t_ns, 1)
         self.turn_out = np.full((len(self.events), 2), np.nan)
-        self.bias = None if evidence.gyro is None else (0.0, noise.gyro_bias**2)
+        at_first = np.zeros(2), np.diag([noise.wheel_turn, noise.gyro_bias]) ** 2
+        self.turns: _Turns | None = None if evidence.gyro is None else at_first
         mount = np.diag([noise.mount_m, noise.mount_m, noise.mount_rad]) ** 2
         self.mount = measurement_scale * mount
         self.retry_ns, self.located, self.recoveries = _NEVER, 0, 0
@@ -185,12 +189,12 @@ class _Pass:
         self.retry_ns = _NEVER
         if start.xyyaw is None:
             return None
-        return _State.at(start.xyyaw, start.cov, self.lasting, self.bias)
+        return _State.at(start.xyyaw, start.cov, self.lasting, self.turns)
 
     def remember(self, state: _State) -> None:
-        """Keep the bias that has been found: a robot that is lost still has the same gyroscope."""
-        if self.bias is not None:
-            self.bias = float(state.x[-1]), float(state.P[-1, -1])
+        """Keep what was found of turns: a robot that is lost still has the same wheels and unit."""
+        if self.turns is not None:
+            self.turns = state.x[-2:].copy(), state.P[-2:, -2:].copy()
 
     def search(self, first: int, end: int) -> tuple[int, _State | None]:
         """The state at the first event from which sightings tell it, and the event after that."""
@@ -232,7 +236,8 @@ class _Pass:
         return Filtered(
             self.xyyaw, self.cov + self.mount, self.updated, self.held.part(0, M, 3),
             self.held.part(M, all_, 2), turned,
-            np.nan if self.bias is None else self.bias[0], self.located, self.recoveries,
+            np.full(2, np.nan) if self.turns is None else self.turns[0], self.located,
+            self.recoveries,
             self.silent,
         )  # fmt: skip
 
@@ -264,7 +269,7 @@ class _Pass:
         )  # fmt: skip
         if found is None:
             return None
-        state = _State.at(*found, self.lasting, self.bias)
+        state = _State.at(*found, self.lasting, self.turns)
         state.lost[2] = 1
         self.located += 1
         return state

@@ -1,9 +1,9 @@
 """The filter's loop over events, compiled; tests hold each step against estimators.kalman.
 
 The state is x, y, yaw; for each of the `slots` the lasting errors of one thing: of its range (as a
-share of it) and of its bearing; and last, where there is one, the bias of the gyroscope in rad/s.
-A thing that is seen again takes its own slot, a new one a free slot or the one not seen for
-longest.
+share of it) and of its bearing; and last, where there is a gyroscope, by how much wheels tell turns
+too small, as a share of them (a wrong wheel base), and its bias in rad/s. A thing seen once more
+takes its own slot, a new one a free slot or the one not seen for longest.
 
 One module, longer than most: numba keeps a compiled caller though a function that it calls from
 another file has changed.
@@ -28,6 +28,14 @@ _CONTRADICTED = 100.0
 def wrapped(angle):  # type: ignore[no-untyped-def]
     """An angle brought into [-pi, pi)."""
     return (angle + np.pi) % _TWO_PI - np.pi
+
+
+@njit(cache=True)
+def clear(H):  # type: ignore[no-untyped-def]
+    """Fill a matrix with zeros."""
+    for i in range(H.shape[0]):
+        for j in range(H.shape[1]):
+            H[i, j] = 0.0
 
 
 @njit(cache=True)
@@ -104,6 +112,31 @@ def fade(x, P, end, keep, variance):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
+def scale_turn(x, P, yaw, step):  # type: ignore[no-untyped-def]
+    """Correct a predicted step (3,) by the share that wheels lack of turns, in place.
+
+    The turn is spread evenly along the step, so that half of what it lacks turns the way itself.
+    """
+    n = len(x)
+    w = n - 2
+    cos, sin = np.cos(yaw), np.sin(yaw)
+    dx, dy = cos * step[0] - sin * step[1], sin * step[0] + cos * step[1]
+    by_x, by_y, by_yaw = -0.5 * step[2] * dy, 0.5 * step[2] * dx, step[2]
+    x[0] += by_x * x[w]
+    x[1] += by_y * x[w]
+    x[2] += by_yaw * x[w]
+    for j in range(n):
+        P[0, j] += by_x * P[w, j]
+        P[1, j] += by_y * P[w, j]
+        P[2, j] += by_yaw * P[w, j]
+    for i in range(n):
+        P[i, 0] += by_x * P[i, w]
+        P[i, 1] += by_y * P[i, w]
+        P[i, 2] += by_yaw * P[i, w]
+    x[2] = wrapped(x[2])
+
+
+@njit(cache=True)
 def turn_by_gyro(x, P, yaw, step, Q, turned, variance, dt, gate, out):  # type: ignore[no-untyped-def]
     """Hold the turn of the wheels in a step against the gyroscope's, and take both in, in place.
 
@@ -112,21 +145,24 @@ def turn_by_gyro(x, P, yaw, step, Q, turned, variance, dt, gate, out):  # type: 
     chapter 8). Where the two contradict each other the gyroscope is believed, for wheels slip
     (gyrodometry, Borenstein and Feng 1996), and the way of that step is as uncertain as it is long.
 
-    Args: state and covariance as `predict` left them, the heading before, the step (3,) with its
-    covariance Q (3, 3), the gyroscope's integral `turned` over `dt` seconds and its variance, bias
-    apart, and the largest NIS of wheels that agree. `out` (2,) becomes residual (wheels minus
-    gyroscope) and its variance. Returns ACCEPTED or REJECTED, of the turn of the wheels.
+    Args: state and covariance as `predict` and `scale_turn` left them, the heading before, the step
+    (3,) as the wheels tell it with its covariance Q (3, 3), the gyroscope's integral `turned` over
+    `dt` seconds and its variance, bias apart, and the largest NIS of wheels that agree. `out` (2,)
+    becomes residual (wheels minus gyroscope) and its variance. Returns ACCEPTED or REJECTED, of the
+    turn of the wheels.
     """
     n = len(x)
-    b = n - 1
-    gap = wrapped(step[2] - (turned - x[b] * dt))
-    S = Q[2, 2] + dt * dt * P[b, b] + variance
-    out[0], out[1] = gap, S
+    w, b = n - 2, n - 1
+    gap = wrapped((1.0 + x[w]) * step[2] - (turned - x[b] * dt))
     cos, sin = np.cos(yaw), np.sin(yaw)
     cross = np.zeros(n)
     cross[0] = cos * Q[0, 2] - sin * Q[1, 2]
     cross[1] = sin * Q[0, 2] + cos * Q[1, 2]
     cross[2] = Q[2, 2]
+    for i in range(n):
+        cross[i] += P[i, w] * step[2] + P[i, b] * dt
+    S = Q[2, 2] + variance + (cross[w] * step[2] + cross[b] * dt)
+    out[0], out[1] = gap, S
     status = ACCEPTED
     if gap * gap > gate * S:
         status = REJECTED
@@ -139,8 +175,6 @@ def turn_by_gyro(x, P, yaw, step, Q, turned, variance, dt, gate, out):  # type: 
         P[1, 0] += dx * dy
         P[1, 1] += dy * dy
     for i in range(n):
-        cross[i] += P[i, b] * dt
-    for i in range(n):
         x[i] -= cross[i] / S * gap
     x[2] = wrapped(x[2])
     for i in range(n):
@@ -152,7 +186,7 @@ def turn_by_gyro(x, P, yaw, step, Q, turned, variance, dt, gate, out):  # type: 
 @njit(cache=True)
 def of_point(x, lever, H, expected):  # type: ignore[no-untyped-def]
     """Where a point at `lever` (2,) in the base should be: fills in `expected` (2,), H (2, n)."""
-    H[:, :] = 0.0
+    clear(H)
     cos, sin = np.cos(x[2]), np.sin(x[2])
     off_x, off_y = cos * lever[0] - sin * lever[1], sin * lever[0] + cos * lever[1]
     expected[0], expected[1] = x[0] + off_x, x[1] + off_y
@@ -166,7 +200,7 @@ def of_near(x, place, m, H, expected):  # type: ignore[no-untyped-def]
 
     Fills in `expected` (m,) and H (m, n); `place` (3,) is the thing's.
     """
-    H[:, :] = 0.0
+    clear(H)
     if m == 3:
         for r in range(3):
             expected[r] = x[r]
@@ -185,7 +219,7 @@ def measurement(x, place, slot, m, H, expected):  # type: ignore[no-untyped-def]
 
     Both are filled in: range (with its lasting error), bearing, and for m = 3 the heading.
     """
-    H[:, :] = 0.0
+    clear(H)
     away_x, away_y = place[0] - x[0], place[1] - x[1]
     reach = max(np.hypot(away_x, away_y), NEAREST_M)
     share = x[slot] if slot > 0 else 0.0
@@ -210,7 +244,8 @@ def times_rows(P, H, m, out):  # type: ignore[no-untyped-def]
     """Fill in `out` (m, n) with H P for the first m rows of a sparse H (m, n)."""
     n = P.shape[0]
     for r in range(m):
-        out[r, :] = 0.0
+        for j in range(n):
+            out[r, j] = 0.0
         for i in range(n):
             if H[r, i] != 0.0:
                 for j in range(n):
@@ -335,8 +370,8 @@ def slot_of(thing, holder, seen, x, P, variance):  # type: ignore[no-untyped-def
     at = 3 + 2 * oldest
     for i in range(at, at + 2):
         x[i] = 0.0
-        P[i, :] = 0.0
-        P[:, i] = 0.0
+        for j in range(len(x)):
+            P[i, j] = P[j, i] = 0.0
         P[i, i] = variance[i - at]
     return at
 
@@ -353,7 +388,8 @@ def take_in(k, m, gate, R, residual, x, P, H, HP, S, L, residual_out, S_out, mov
         residual_out[k, r] = residual[r]
         for c in range(m):
             S_out[k, r, c] = S[r, c]
-    moved_out[k, :] = 0.0
+    for r in range(3):
+        moved_out[k, r] = 0.0
     if not lower(S, m, L) or squared(L, residual, m) > gate:
         return REJECTED
     before_x, before_y, before_yaw = x[0], x[1], x[2]
@@ -433,20 +469,25 @@ def run(  # type: ignore[no-untyped-def]  # noqa: C901 - the filter's loop
             if end > 3 and t_ns[e] > t_ns[e - 1]:
                 fade(x, P, end, np.exp((t_ns[e - 1] - t_ns[e]) * 1e-9 / lasting_s), lasting)
             if n > end and t_ns[e] > t_ns[e - 1]:
+                scale_turn(x, P, yaw, steps[e])
                 dt = (t_ns[e] - t_ns[e - 1]) * 1e-9
                 P[n - 1, n - 1] += bias_walk * dt
                 if np.isfinite(turns[e]):
-                    before[:] = x[:3]
+                    for r in range(3):
+                        before[r] = x[r]
                     turn_status_out[e] = turn_by_gyro(
                         x, P, yaw, steps[e], Q[e], turns[e], turn_variance[e], dt, gates[1],
                         turn_out[e],
                     )  # fmt: skip
-                    turn_moved_out[e] = x[:3] - before
+                    for r in range(3):
+                        turn_moved_out[e, r] = x[r] - before[r]
                     turn_moved_out[e, 2] = wrapped(turn_moved_out[e, 2])
         s, k = measured[e], row[e]
         if k >= 0:
-            xyyaw_out[k] = x[:3]
-            cov_out[k] = P[:3, :3]
+            for r in range(3):  # slices would be shorter, and take far longer to compile
+                xyyaw_out[k, r] = x[r]
+                for c in range(3):
+                    cov_out[k, r, c] = P[r, c]
             updated_out[k] = lost[2]
             lost[2] = 0
         if s < 0:

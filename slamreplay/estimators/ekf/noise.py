@@ -47,6 +47,8 @@ class Noise:
         gyro_clock_s: of its clock against the odometry's, s.
         gyro_bias: of its bias at the start, rad/s,
         gyro_bias_per_root_s: and of what that changes by in one second, rad/s.
+        wheel_turn: of the share by which wheels tell every turn too small or too large, where a
+            gyroscope can tell it; skid-steered wheels, off by far more, are found out, too.
         mount_m: of where the sensor sits on the base, along each axis, m,
         mount_rad: and of how it is turned, rad. The filter follows the sensor and no sighting
             tells these: they are added to the covariance that it gives out, never fitted. 0 by
@@ -82,6 +84,7 @@ class Noise:
     gyro_clock_s: float = 0.02
     gyro_bias: float = 0.03
     gyro_bias_per_root_s: float = 1e-4
+    wheel_turn: float = 0.02
     mount_m: float = 0.0
     mount_rad: float = 0.0
     range_ratio: float = 1.0

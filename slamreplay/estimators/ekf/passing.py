@@ -91,7 +91,8 @@ class Filtered:
         sighted: the M observations: range, bearing, heading.
         fixed: the satellite fixes: x and y.
         turned: the turns of the wheels against those of the gyroscope.
-        bias: of the gyroscope at the end, rad/s; NaN without one.
+        turns: (2,) at the end: the share that wheels lack of turns, and the bias of the gyroscope
+            in rad/s; NaN without one.
         located: how often the filter placed itself by sightings alone.
         recoveries: how often of these it had been lost.
         silent: observations and fixes at times at which odometry says nothing.
@@ -103,7 +104,7 @@ class Filtered:
     sighted: Held
     fixed: Held
     turned: Held
-    bias: float
+    turns: se2.Array
     located: int
     recoveries: int
     silent: int

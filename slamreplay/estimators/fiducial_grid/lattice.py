@@ -213,7 +213,11 @@ def _cells(
     way: se2.Array,
     spacing_m: float,
 ) -> NDArray[np.int64]:
-    """(C, 2) steps of codes along the axes; rows begin at the number that most ways agree with."""
+    """(C, 2) steps of codes along the axes; rows begin at a number that most ways agree with.
+
+    Where several do, for the robot never drove there, at the one farthest from where it did: a code
+    of a column that was never crossed may be placed at the wrong end of its row.
+    """
     if columns == 0:
         return np.asarray((number - number.min(axis=0)) @ per)
     along = np.rint(way / spacing_m).astype(np.int64) @ per[0]
@@ -222,6 +226,19 @@ def _cells(
         int(((first - begin) % columns + along == (last - begin) % columns).sum())
         for begin in range(columns)
     ]
-    begin = int(np.argmax(agreed))
+    begin = _middle(np.array(agreed) == max(agreed))
     row, column = np.divmod(number[:, 0] - begin, columns)
     return np.asarray(np.column_stack([column, row]) @ per)
+
+
+def _middle(holds: NDArray[np.bool_]) -> int:
+    """The middle of the longest stretch (round the end) of (N,) flags of which one is set."""
+    n = len(holds)
+    if holds.all():
+        return 0
+    first = int(np.argmin(holds))  # a stretch never reaches over this one
+    turned = np.roll(holds, -first)
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], turned.astype(np.int64), [0]])))
+    starts, ends = edges[::2], edges[1::2]
+    longest = int(np.argmax(ends - starts))
+    return int((first + (starts[longest] + ends[longest] - 1) // 2) % n)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 from typing import Literal
 
 
@@ -42,6 +43,20 @@ class MatchConfig:
     heading_per_metre: float = 0.08
     heading_per_turn: float = 0.12
     late_part: float = 0.05
-    doubted: float = 0.8
+    doubted: float = 0.9
     poor: float = 0.45
     lost_scans: int = 5
+
+    def scaled(self, process: float, measurement: float) -> MatchConfig:
+        """The same with variances of odometry and of matches so many times as large."""
+        if process == measurement == 1.0:
+            return self
+        root = math.sqrt(process)
+        return replace(
+            self,
+            position_per_metre=root * self.position_per_metre,
+            position_per_turn=root * self.position_per_turn,
+            heading_per_metre=root * self.heading_per_metre,
+            heading_per_turn=root * self.heading_per_turn,
+            points_per_fact=measurement * self.points_per_fact,
+        )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from typing import ClassVar, Self
 
 import numpy as np
@@ -12,7 +12,7 @@ from slamreplay.bundle.odometry import odometry_track
 from slamreplay.bundle.run import Estimate
 from slamreplay.bundle.track import PoseTrack
 from slamreplay.bundle.view import BundleView
-from slamreplay.errors import NotApplicableError
+from slamreplay.errors import NotApplicableError, UsageError
 from slamreplay.estimators.inputs import need_scans
 from slamreplay.estimators.parameters import settings_from
 from slamreplay.estimators.scan_matching.config import MatchConfig
@@ -23,6 +23,9 @@ from slamreplay.estimators.scan_matching.trajectory import LocalTrajectory
 from slamreplay.estimators.start import OFFSET, ROTATE, Start, starts
 from slamreplay.geometry import se2
 from slamreplay.geometry.covariance import turned
+
+#: Settings a perturbation may change: ratios of the covariances of odometry and of matches.
+PROCESS_NOISE, MEASUREMENT_NOISE = "process_noise_scale", "measurement_noise_scale"
 
 
 @dataclass(frozen=True)
@@ -38,9 +41,12 @@ class ScanMatching:
 
     config: MatchConfig = field(default_factory=MatchConfig)
 
+    parameter_names: ClassVar[frozenset[str]] = frozenset(f.name for f in fields(MatchConfig))
     name: ClassVar[str] = "scan_matching"
     needs: ClassVar[frozenset[str]] = frozenset({"scans"})
-    settings: ClassVar[frozenset[str]] = frozenset({OFFSET, ROTATE})
+    settings: ClassVar[frozenset[str]] = frozenset(
+        {OFFSET, ROTATE, PROCESS_NOISE, MEASUREMENT_NOISE}
+    )
     without_noise: ClassVar[str] = "what a match weighs is measured on the log, not told"
 
     @classmethod
@@ -50,7 +56,13 @@ class ScanMatching:
         Raises:
             UsageError: one that there is not, or a value that it cannot take.
         """
-        return cls(settings_from(MatchConfig, given, where=cls.name))
+        config = settings_from(MatchConfig, given, where=cls.name)
+        for name in sorted(cls.parameter_names - {"icp"}):
+            if not getattr(config, name) > 0.0:
+                raise UsageError(
+                    f"'{name}' is {getattr(config, name)}: it should be more than 0", where=cls.name
+                )
+        return cls(config)
 
     def run(self, view: BundleView, *, seed: int) -> Estimate:  # noqa: ARG002 - nothing is random
         """One row per scan, NaN before the start and the first scan with enough points.
@@ -64,7 +76,10 @@ class ScanMatching:
         """
         scans = need_scans(view, self.name)
         odometry = odometry_track(view)
-        local = local_trajectory(scans, odometry, self.config)
+        config = self.config.scaled(
+            view.settings.get(PROCESS_NOISE, 1.0), view.settings.get(MEASUREMENT_NOISE, 1.0)
+        )
+        local = local_trajectory(scans, odometry, config)
         if not len(local.nodes):
             raise NotApplicableError("no scan has enough points to be matched", where=self.name)
         frame, T_frame_local, start = _placed(view, local, odometry)

@@ -9,6 +9,7 @@ import numpy as np
 
 from slamreplay.estimators.scan_matching import fusion, rescue
 from slamreplay.estimators.scan_matching.config import MatchConfig
+from slamreplay.estimators.scan_matching.fit import Fit
 from slamreplay.geometry import se2
 from slamreplay.matching.field import ScoreField
 from slamreplay.matching.line_map import LineMap, align
@@ -29,9 +30,10 @@ GUESS_PART, GUESS_M, GUESS_RAD = 0.5, 0.03, 0.03
 BRIDGED_PART, BRIDGED_M, BRIDGED_RAD = 0.5, 0.02, 0.02
 #: What a scan's pose misses that nothing else shows, at the least, m and rad.
 JITTER_M, JITTER_RAD = 0.001, 0.0005
-#: How fast the steady motion follows. A sweep laid out by the last motion alone would swing up: an
-#: error of it makes one of the next with the other sign, and of about its size.
-STEADY_RATE = 0.25
+#: How fast what odometry does not tell is learned. A sweep laid out by the last motion alone would
+#: swing up: an error of it makes one of the next with the other sign, and of about its size. Less
+#: than this, m and rad, is not told from errors of matches.
+STEADY_RATE, UNSAID_M, UNSAID_RAD = 0.25, 0.02, 0.015
 #: How fast the typical score and spread follow.
 RATE = 0.02
 #: A point's standard deviation about its line is not less than this, m.
@@ -42,32 +44,6 @@ MOST_STEPS = 20
 
 
 _LIKELY = (fusion.LIKELY_FACTOR, fusion.LIKELY_FACTOR_YAW, fusion.FIRST_SCANS)
-
-
-@dataclass(frozen=True, eq=False)
-class Fit:
-    """How a scan came to its pose: rows of the ledger.
-
-    Attributes:
-        pose: (3,).
-        residual: (3,) match minus prediction; NaN where nothing was matched.
-        S: (3, 3) its covariance.
-        score: 0 to 1; NaN where nothing was matched.
-        accepted: whether the match was used.
-        moved: (3,) pose minus prediction.
-    """
-
-    pose: se2.Array
-    residual: se2.Array
-    S: se2.Array
-    score: float
-    accepted: bool
-    moved: se2.Array
-
-    @property
-    def is_matched(self) -> bool:
-        """Whether there was enough to match."""
-        return self.score == self.score
 
 
 @dataclass(eq=False)
@@ -81,7 +57,8 @@ class Follower:
         cov: (3, 3) of it against the last node, about axes of the local frame.
         carried: (3, 3) of it, had nothing been matched since.
         motion: (3,) from the scan before, in the axes of the base there.
-        steady: (3,) of the last scans.
+        unsaid: (3,) what odometry did not tell of it, over the last scans; all of it where there is
+            none.
         learned: (3,) what odometry misses, as in `fusion.predict`.
         typical: score of the last matches.
         variance: of a point about its line in them, m^2.
@@ -94,7 +71,7 @@ class Follower:
     cov: se2.Array = field(default_factory=lambda: np.zeros((3, 3)))
     carried: se2.Array = field(default_factory=lambda: np.zeros((3, 3)))
     motion: se2.Array = field(default_factory=lambda: np.zeros(3))
-    steady: se2.Array = field(default_factory=lambda: np.zeros(3))
+    unsaid: se2.Array = field(default_factory=lambda: np.zeros(3))
     learned: se2.Array = field(default_factory=lambda: np.array(_LIKELY))
     typical: float = 0.85
     variance: float = 0.02**2
@@ -109,6 +86,7 @@ class Follower:
         ])  # fmt: skip
         self._prior, self._noise, self._told = np.empty(3), np.empty(4), np.empty(30)
         self._expected, self._held, self._jitter = (np.empty((3, 3)) for _ in range(3))
+        self._step = np.zeros(3)
         self._room, self._sums = np.empty((3, 3, 3)), np.empty((4, 3))
         self._field: ScoreField | None = None
         self._target: LineTarget | None = None
@@ -164,8 +142,23 @@ class Follower:
             return self._missed(prior, score)
         return self._accepted(prior, pose, score, nis)
 
+    def in_sweep(self, during: se2.Array, part: float, *, is_told: bool) -> se2.Array:
+        """Motion (3,) in a sweep, of which odometry tells `during` (3,).
+
+        Wheels that stand while the robot is carried leave its sweeps smeared.
+
+        Args:
+            during: zero where nothing is told.
+            part: of the time between two scans.
+            is_told: whether odometry told it.
+        """
+        way, turn = _size(self.unsaid)
+        if is_told and way < UNSAID_M and turn < UNSAID_RAD:
+            return during
+        return np.asarray(during + part * self.unsaid)
+
     def _predicted(self, step: se2.Array, *, is_bridged: bool) -> se2.Array:
-        least = _LEAST
+        least, self._step = _LEAST, np.where(np.isfinite(step), step, 0.0)
         if step[0] != step[0]:
             step = self.motion
             least = GUESS_PART * _size(step) + (GUESS_M, GUESS_RAD)
@@ -253,7 +246,8 @@ class Follower:
         self.lost = 0
         (x, y, yaw), c, s = _off(pose, self.pose), np.cos(self.pose[2]), np.sin(self.pose[2])
         self.motion = np.array([c * x + s * y, c * y - s * x, yaw])
-        self.steady += STEADY_RATE * (self.motion - self.steady)
+        unsaid = np.clip(self.motion - self._step, -_MOST_UNSAID, _MOST_UNSAID)
+        self.unsaid += STEADY_RATE * (unsaid - self.unsaid)
         self.pose = pose
         S = told[3:12].reshape(3, 3).copy()
         return Fit(pose, told[:3].copy(), S, score, accepted=True, moved=moved)
@@ -262,7 +256,7 @@ class Follower:
         """Go on by odometry alone."""
         self.pose = prior
         self.cov = self.carried.copy()
-        self.motion, self.steady = np.zeros(3), np.zeros(3)
+        self.motion, self.unsaid = np.zeros(3), np.zeros(3)
         residual, S = np.full(3, np.nan), np.full((3, 3), np.nan)
         if score == score:
             self.lost += 1
@@ -281,5 +275,7 @@ def _off(pose: se2.Array, other: se2.Array) -> se2.Array:
     return off
 
 
+#: Odometry that begins anew tells of nothing that happened, m, m and rad.
+_MOST_UNSAID = np.array([0.5, 0.5, 0.5])
 _LEAST = np.array([fusion.LEAST_M, fusion.LEAST_RAD])
 _JITTER = np.array([JITTER_M, JITTER_RAD])

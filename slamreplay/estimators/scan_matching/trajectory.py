@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from slamreplay.estimators.scan_matching.follower import Fit
+from slamreplay.estimators.scan_matching.fit import Fit
 from slamreplay.geometry import se2
 
 

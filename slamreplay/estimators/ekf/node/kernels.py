@@ -11,6 +11,7 @@ from numba import njit
 from slamreplay.estimators.ekf.kernels import (
     ACCEPTED,
     REJECTED,
+    clear,
     correct,
     innovate,
     lower,
@@ -33,7 +34,7 @@ def carried(J, P):  # type: ignore[no-untyped-def]
             if J[i, k] != 0.0:
                 for j in range(n):
                     JP[i, j] += J[i, k] * P[k, j]
-    P[:, :] = 0.0
+    clear(P)
     for j in range(n):
         for k in range(n):
             if J[j, k] != 0.0:
@@ -109,11 +110,16 @@ def run(  # type: ignore[no-untyped-def]  # noqa: C901 - the filter's loop
             continue
         k = row[e]
         if k >= 0 and is_started:
-            ahead[:], P_ahead[:, :] = x, P
+            for i in range(STATES):
+                ahead[i] = x[i]
+                for j in range(STATES):
+                    P_ahead[i, j] = P[i, j]
             if t_ns[e] > last_ns:
                 predict(ahead, P_ahead, (t_ns[e] - last_ns) * 1e-9, Q, scales)
-            xyyaw_out[k] = ahead[:3]
-            cov_out[k] = P_ahead[:3, :3]
+            for i in range(3):
+                xyyaw_out[k, i] = ahead[i]
+                for j in range(3):
+                    cov_out[k, i, j] = P_ahead[i, j]
             updated_out[k] = fresh
             fresh = 0.0
         s = measured[e]
@@ -135,7 +141,7 @@ def run(  # type: ignore[no-untyped-def]  # noqa: C901 - the filter's loop
         if t_ns[e] > last_ns:
             predict(x, P, (t_ns[e] - last_ns) * 1e-9, Q, scales)
         last_ns = t_ns[e]
-        H[:, :] = 0.0
+        clear(H)
         for r in range(m):
             i = index[r]
             H[r, i] = 1.0
@@ -154,13 +160,14 @@ def run(  # type: ignore[no-untyped-def]  # noqa: C901 - the filter's loop
             residual_out[s, r] = residual[r]
             for c in range(m):
                 S_out[s, r, c] = S[r, c]
-        moved_out[s, :] = 0.0
+        for i in range(3):
+            moved_out[s, i], before[i] = 0.0, x[i]
         status_out[s] = REJECTED
         if not lower(S, m, L) or squared(L, residual, m) >= threshold[s] * threshold[s]:
             continue
-        before[:] = x[:3]
         correct(x, P, H, noise, m, HP, L, residual)
         status_out[s] = ACCEPTED
         fresh = 1.0
-        moved_out[s] = x[:3] - before
+        for i in range(3):
+            moved_out[s, i] = x[i] - before[i]
         moved_out[s, 2] = wrapped(moved_out[s, 2])

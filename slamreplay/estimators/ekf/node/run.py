@@ -44,6 +44,9 @@ def run_node(
     if not parts:
         inputs = ", ".join(f"{one.name} {one.topic}" for one in parameters.inputs)
         hint = f"the log has {', '.join(_topics(view)) or 'none that could be one'}"
+        if any(messages.values()):
+            base = parameters.base_frame or view.manifest.frames.base or "base_link"
+            hint = f"nothing is chosen by its _config, or tf leads to neither {base} nor the world"
         raise NotApplicableError(
             f"none of its inputs measures anything in this log: {inputs}", where=name, hint=hint
         )
