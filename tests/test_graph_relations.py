@@ -94,6 +94,22 @@ def test_a_relation_that_is_taken_out_again_leaves_no_trace():
     assert online.poses == pytest.approx(before, abs=2e-3)
 
 
+def test_loosened_motions_are_known_less_well():
+    _, guess, chain, _ = circle(np.random.default_rng(5))
+    plain, loosened = (OnlineGraph(guess[0], np.zeros((3, 3))) for _ in range(2))
+    for graph in (plain, loosened):
+        for k in range(20):
+            graph.extend(chain.xyyaw[k], chain.cov[k])
+
+    loosened.loosen(10, 20, 9.0)
+    loosened.extend(chain.xyyaw[20], chain.cov[20])
+
+    assert loosened.poses[:21] == pytest.approx(plain.poses, abs=1e-6)
+    assert loosened.marginal(10) == pytest.approx(plain.marginal(10), rel=1e-6, abs=1e-9)
+    ratio = loosened.relative(loosened.poses, 10, 20) / plain.relative(plain.poses, 10, 20)
+    assert np.diag(ratio) == pytest.approx(9.0, rel=1e-3)
+
+
 def test_the_relative_covariance_is_that_of_samples():
     rng = np.random.default_rng(4)
     i, j = np.array([1.0, -2.0, 0.7]), np.array([3.0, 1.5, -1.9])

@@ -6,15 +6,21 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from slamreplay.bundle.track import PoseTrack
 from slamreplay.errors import NotApplicableError, UsageError
-from slamreplay.estimators.pose_graph.closing import Candidate, relations_of
+from slamreplay.estimators.pose_graph.carrying import carried, carried_covariances
+from slamreplay.estimators.pose_graph.closing import Candidate, Closer, relations_of
 from slamreplay.estimators.pose_graph.config import GraphConfig
+from slamreplay.estimators.pose_graph.doubt import doubted
 from slamreplay.estimators.pose_graph.estimator import PoseGraph, PoseGraphOnline
 from slamreplay.estimators.pose_graph.product import map_and_graph
 from slamreplay.estimators.pose_graph.refining import overlapping
-from slamreplay.estimators.pose_graph.submaps import chain_covariances
+from slamreplay.estimators.pose_graph.submaps import chain_covariances, submaps
+from slamreplay.estimators.scan_matching.follower import Fit
+from slamreplay.estimators.scan_matching.local import LocalTrajectory
 from slamreplay.geometry import se2
 from slamreplay.geometry.covariance import composed
+from slamreplay.graph.online import OnlineGraph
 from slamreplay.ingest.pipeline import ingest
 from slamreplay.report.figures.canvas import plain_style, svg_bytes
 from slamreplay.report.figures.graph import graph_figure
@@ -82,6 +88,8 @@ def test_closures_are_told_with_all_that_led_to_them(batch, laps):
     found = closures(batch)
 
     assert found.accepted.sum() >= 3
+    assert batch.scalars["closures_accepted"] == found.accepted.sum()
+    assert batch.scalars["relations_between_passes"] > 50
     assert found.residual.shape == (len(found.t_ns), 3)
     assert np.linalg.eigvalsh(found.S).min() > 0.0
     assert (found.score[found.accepted] >= GraphConfig().min_score).all()
@@ -179,6 +187,20 @@ def test_the_covariance_of_a_chain_is_that_of_its_steps_one_by_one():
         assert cov == pytest.approx(P, abs=1e-12)
 
 
+@pytest.mark.parametrize(("nis", "ratio"), [(0.1, 1.0), (2.366, 1.0), (11.83, 5.0), (900.0, 10.0)])
+def test_motions_are_trusted_by_what_good_matches_say(nis, ratio):
+    local = handmade_local(x=np.arange(4.0), nodes=[0, 1, 2, 3], breaks=[], missed=[])
+    local = replace(local, points=tuple(np.eye(2) for _ in range(4)))
+    closer = Closer(submaps(local, 1.0, 10.0), OnlineGraph(np.zeros(3), np.eye(3)), GraphConfig())
+
+    closer.told += [nis] * 4
+    few = closer.ratio
+    closer.told.append(nis)
+
+    assert few == 1.0
+    assert closer.ratio == pytest.approx(ratio)
+
+
 def test_nodes_of_the_same_pass_are_not_laid_onto_each_other():
     x = np.concatenate([np.arange(0.0, 20.0, 0.5), np.arange(20.0, 0.0, -0.5)])
     poses = np.column_stack([x, 0.1 * np.sin(x), np.repeat([0.0, 0.3], 40)])
@@ -192,6 +214,52 @@ def test_nodes_of_the_same_pass_are_not_laid_onto_each_other():
     assert (pairs[:, 1] >= 40).all()
     assert (np.abs(x[pairs[:, 0]] - x[pairs[:, 1]]) <= config.pass_m).all()
     assert 2 <= np.bincount(pairs[:, 1]).max() <= config.passes
+
+
+def test_scans_that_fit_nothing_before_a_break_belong_to_what_follows():
+    """Nodes 0, 1 | 2: the robot was carried away after scan 2; scans 3 and 4 fitted nothing."""
+    local = handmade_local(
+        x=[0.0, 1.0, 1.2, 1.4, 1.6, 1.8], nodes=[0, 1, 5], breaks=[2], missed=[3, 4]
+    )
+    poses = np.array([[0.0, 0, 0], [1, 0, 0], [50, 9, 0]])
+    cov = np.array([1e-6, 1e-6, 4.0])[:, None, None] * np.eye(3)
+
+    xyyaw = carried(local, poses)
+    covs = carried_covariances(local, poses, cov)
+
+    assert xyyaw[:3, 0] == pytest.approx([0.0, 1.0, 1.2])
+    assert xyyaw[3:, 0] == pytest.approx([49.6, 49.8, 50.0])
+    assert xyyaw[3:, 1] == pytest.approx(9.0)
+    assert covs[2, 1, 1] < 0.01
+    assert covs[4, 1, 1] == pytest.approx(4.0, rel=0.2)
+
+
+def handmade_local(x, nodes, breaks, missed):
+    count, rows = len(x), np.array(nodes)
+    pose = np.column_stack([x, np.zeros(count), np.zeros(count)])
+    is_break = np.zeros(len(nodes), dtype=bool)
+    is_break[breaks] = True
+    fit = Fit(np.zeros(3), np.zeros(3), np.eye(3), 0.9, accepted=True, moved=np.zeros(3))
+    fits = [replace(fit, accepted=k not in missed) for k in range(count)]
+    tiny = np.tile(np.eye(3) * 1e-6, (count, 1, 1))
+    none = tuple(np.empty((0, 2)) for _ in nodes)
+    return LocalTrajectory(
+        np.arange(count) * 10**8, pose, np.full(count, 0.9), rows, none, np.zeros(2),
+        np.full(len(nodes), 0.9), tiny[: len(nodes) - 1], is_break, none, tiny, tuple(fits),
+    )  # fmt: skip
+
+
+def test_motions_are_doubted_where_the_wheels_say_something_else():
+    local = handmade_local(x=[0.0, 0.2, 0.9, 1.1], nodes=[0, 1, 2, 3], breaks=[], missed=[])
+    wheels = np.column_stack([[0.0, 0.2, 0.4, 0.6], np.zeros(4), np.zeros(4)])
+    odometry = PoseTrack.without_covariance("odom", "base_link", local.t_ns, wheels)
+
+    cov = doubted(local, odometry)
+
+    assert cov[[0, 2]] == pytest.approx(local.motion_cov[[0, 2]])
+    assert np.sqrt(cov[1, 0, 0]) == pytest.approx(0.5, rel=0.05)
+    assert np.sqrt(cov[1, 1, 1]) < 0.2
+    assert doubted(local, None) is local.motion_cov
 
 
 def test_no_candidates_make_no_relations():

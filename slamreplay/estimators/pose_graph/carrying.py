@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from slamreplay.estimators.pose_graph.beginning import Beginning
 from slamreplay.estimators.pose_graph.closing import Closed
@@ -12,19 +13,46 @@ from slamreplay.geometry import se2
 from slamreplay.geometry.covariance import swing, turned
 
 
+def carried(local: LocalTrajectory, poses: se2.Array) -> se2.Array:
+    """Poses (N, 3) of all scans where the nodes are moved to (K, 3).
+
+    As `LocalTrajectory.carried`; but scans right before a break that fitted nothing were taken
+    where the break ends: the robot was somewhere else already.
+    """
+    out = local.carried(poses)
+    for rows, node in _before_breaks(local):
+        here = local.node_xyyaw[node]
+        out[rows] = se2.compose(poses[node], se2.between(here, local.xyyaw[rows]))
+    return out
+
+
+def _before_breaks(local: LocalTrajectory) -> list[tuple[NDArray[np.int64], int]]:
+    """Scans that belong to the node after a break, and that node."""
+    found = []
+    for node in np.flatnonzero(local.is_break[1:]) + 1:
+        last, before = int(local.nodes[node]), int(local.nodes[node - 1])
+        fits = local.fits[before + 1 : last]
+        used = [k for k, fit in enumerate(fits) if fit is not None and fit.accepted]
+        first = before + 2 + used[-1] if used else before + 1
+        found.append((np.arange(first, last), int(node)))
+    return found
+
+
 def carried_covariances(local: LocalTrajectory, poses: se2.Array, cov: se2.Array) -> se2.Array:
     """Covariances (N, 3, 3) of all scans from those of the nodes (K, 3, 3) at `poses` (K, 3).
 
-    A scan between two nodes has of both their errors what `LocalTrajectory.carried` takes of their
-    poses. What each scan misses by itself, and its neighbours do not, comes on top.
+    A scan between two nodes has of both their errors what `carried` takes of their poses. What each
+    scan misses by itself, and its neighbours do not, comes on top.
     """
     out = np.full((len(local.xyyaw), 3, 3), np.nan)
     node = local.node_of
     rows = np.flatnonzero(node >= 0)
-    here = local.carried(poses)[rows]
+    here = carried(local, poses)[rows]
     low = node[rows]
     high = np.minimum(low + 1, len(local.nodes) - 1)
     high = np.where(local.is_break[high], low, high)
+    for late, after in _before_breaks(local):
+        low[late - rows[0]] = high[late - rows[0]] = after
     first, last = local.nodes[low], local.nodes[high]
     part = ((rows - first) / np.maximum(last - first, 1))[:, None, None]
     each = [_swung(here, poses[k], cov[k]) for k in (low, high)]

@@ -26,6 +26,8 @@ ANY_HEADING = np.pi / 4.0
 #: So many matches tell whether motions err more than they say; the median of chi-square of 3
 #: degrees of freedom; and the largest ratio that is believed.
 ENOUGH, MEDIAN, MOST_RATIO = 5, 2.366, 10.0
+#: Cells in which points of two submaps are the same place, m.
+ALIKE_M = 0.2
 #: Closures that confirm each other come from submaps at most so many apart.
 TOGETHER = 6
 
@@ -114,7 +116,7 @@ def close_loops(
         match_scale: ratio by which covariances of matches are changed.
         with_cov: whether the covariance of each belief is worked out.
     """
-    closer = _Closer(maps, OnlineGraph(first, first_cov), config, match_scale)
+    closer = Closer(maps, OnlineGraph(first, first_cov), config, match_scale)
     belief, cov = [first], [first_cov]
     for new in range(1, len(maps)):
         closer.take(new)
@@ -130,17 +132,24 @@ def close_loops(
     )
 
 
-class _Closer:
-    """The graph of submaps as it grows, and the closures that wait for others to confirm them."""
+class Closer:
+    """The graph of submaps as it grows, and the closures that wait for others to confirm them.
+
+    Args:
+        maps: the submaps.
+        graph: holds the first one.
+        config: hyper-parameters.
+        match_scale: ratio by which covariances of matches are changed.
+    """
 
     def __init__(
-        self, maps: Submaps, graph: OnlineGraph, config: GraphConfig, match_scale: float
+        self, maps: Submaps, graph: OnlineGraph, config: GraphConfig, match_scale: float = 1.0
     ) -> None:
         self.maps, self.graph, self.config, self.match_scale = maps, graph, config, match_scale
         self.poses = graph.poses
         self.candidates: dict[int, Candidate] = {}  # by the new submap
         self.loosened = np.ones(len(maps) - 1)
-        self._told: list[float] = []  # NIS of good matches, had the motions erred as they say
+        self.told: list[float] = []  # NIS of good matches, had the motions erred as they say
         self._waiting: list[int] = []
         self._searcher = Searcher()
         self._last = maps.way[maps.stops[1:] - 1]  # way to the last node of each
@@ -152,9 +161,9 @@ class _Closer:
         The median of their NIS over what it should be, so that a single slip does not count; never
         less than 1, for where matches err most themselves they tell nothing.
         """
-        if len(self._told) < ENOUGH:
+        if len(self.told) < ENOUGH:
             return 1.0
-        return float(np.clip(np.median(self._told) / MEDIAN, 1.0, MOST_RATIO))
+        return float(np.clip(np.median(self.told) / MEDIAN, 1.0, MOST_RATIO))
 
     def take(self, new: int) -> None:
         """Add a submap to the graph, and look for it."""
@@ -189,18 +198,20 @@ class _Closer:
     def _placed(
         self, new: int, near: int, known: NDArray[np.int64], reach_m: float, reach_rad: float
     ) -> Candidate | None:
-        """Search for a submap on the known ones, in axes of the near one; lay it on the nearest."""
+        """Search for a submap on the known ones, in axes of the near one; lay it on the likest."""
         poses, maps = self.poses, self.maps
-        seen = np.concatenate([
+        clouds = [
             se2.transform_points(pose, maps.clouds[k])
             for k, pose in zip(known, se2.between(poses[near], poses[known]), strict=True)
-        ])  # fmt: skip
+        ]
         expected = se2.between(poses[near], poses[new])
-        place = self._searcher.best(seen, maps.clouds[new], expected, reach_m, reach_rad)
+        place = self._searcher.best(
+            np.concatenate(clouds), maps.clouds[new], expected, reach_m, reach_rad
+        )
         if place is None:
             return None
         there = se2.compose(poses[near], place.xyyaw)
-        on = int(known[np.argmin(self._away(known, there))])
+        on = int(known[_most_alike(clouds, se2.transform_points(place.xyyaw, maps.clouds[new]))])
         cov = np.linalg.inv(information_of(place.information, self.config))
         cov = turned(cov, poses[near, 2] - poses[on, 2]) * self.match_scale
         left = self.config.closure_m, self.config.closure_m, self.config.closure_rad
@@ -212,7 +223,7 @@ class _Closer:
         S = relative * self.ratio + cov
         nis = float(residual @ np.linalg.solve(S, residual))
         if place.score >= self.config.min_score:
-            self._told.append(float(residual @ np.linalg.solve(relative + cov, residual)))
+            self.told.append(float(residual @ np.linalg.solve(relative + cov, residual)))
         return Candidate(on, new, z, cov, place.score, residual, S, nis, float(poses[on, 2]))
 
     def _judge(self, found: Candidate, *, is_sure: bool) -> None:
@@ -227,11 +238,13 @@ class _Closer:
         self._waiting = [k for k in self._waiting if k not in agreeing]
         relations = relations_of([self.candidates[k] for k in taken])
         before = self.poses[found.new]
-        self._loosen(found, max(self.candidates[k].nis for k in taken))
+        since, ratio = self._against(found, max(self.candidates[k].nis for k in taken))
+        self._loosen(since, found.new, ratio)
         numbers = self.graph.close(relations)
         self.poses = self.graph.poses
         if (relations.chi2(self.poses) > self.config.gate).any():
             self.graph.undo(numbers)  # what the others say of the same places speaks against it
+            self._loosen(since, found.new, 1.0 / ratio)
             self.poses = self.graph.poses
             return
         moved = self.poses[found.new] - before
@@ -240,18 +253,20 @@ class _Closer:
             own = moved if k == found.new else np.full(3, np.nan)
             self.candidates[k] = replace(self.candidates[k], accepted=True, moved=own)
 
-    def _loosen(self, found: Candidate, nis: float) -> None:
-        """Trust the motions less that closures speak against, which agree with each other.
+    def _against(self, found: Candidate, nis: float) -> tuple[int, float]:
+        """From which submap on the motions are trusted less, and the ratio of their covariances.
 
-        Those since the last closure: what was tied up before has been confirmed. The covariance
-        grows by the variance factor NIS / 3, after which the closures are as expected.
+        Closures that agree with each other speak against them. It is those since the last closure:
+        what was tied up before has been confirmed. The covariance grows by the variance factor
+        NIS / 3, after which the closures are as expected.
         """
-        if nis <= self.config.gate:
-            return
         tied = [c.new for c in self.candidates.values() if c.accepted]
-        since, ratio = max([found.old, *tied]), nis / 3.0
-        self.graph.loosen(since, found.new, ratio)
-        self.loosened[since : found.new] *= ratio
+        return max([found.old, *tied]), nis / 3.0 if nis > self.config.gate else 1.0
+
+    def _loosen(self, first: int, last: int, ratio: float) -> None:
+        if ratio != 1.0:
+            self.graph.loosen(first, last, ratio)
+            self.loosened[first:last] *= ratio
 
     def _agree(self, one: Candidate, two: Candidate) -> bool:
         """Whether two closures say the same of the motion between their submaps.
@@ -271,3 +286,14 @@ class _Closer:
         if one.old != two.old:
             S = S + self.graph.relative(poses, two.old, one.old)
         return bool(off @ np.linalg.solve(S, off) < self.config.gate)
+
+
+def _most_alike(clouds: list[se2.Array], cloud: se2.Array) -> int:
+    """Which of some clouds has points in most of the cells that a cloud (M, 2) has points in."""
+    own = _cells(cloud)
+    return int(np.argmax([np.isin(_cells(other), own).sum() for other in clouds]))
+
+
+def _cells(points: se2.Array) -> NDArray[np.int64]:
+    cell = np.floor(points / ALIKE_M).astype(np.int64)
+    return np.unique(cell[:, 0] * 10_000_019 + cell[:, 1])

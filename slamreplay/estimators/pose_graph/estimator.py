@@ -12,7 +12,7 @@ from slamreplay.bundle.run import Estimate
 from slamreplay.bundle.track import PoseTrack
 from slamreplay.bundle.view import BundleView
 from slamreplay.estimators.parameters import settings_from
-from slamreplay.estimators.pose_graph.carrying import as_driven, carried_covariances
+from slamreplay.estimators.pose_graph.carrying import as_driven, carried, carried_covariances
 from slamreplay.estimators.pose_graph.config import GraphConfig
 from slamreplay.estimators.pose_graph.ledger import closures_ledger
 from slamreplay.estimators.pose_graph.slam import (
@@ -76,7 +76,7 @@ class PoseGraph:
         slam = slam_of(view, self.config, self.name, is_online=False)
         assert slam.smoothed is not None
         nodes = slam.smoothed
-        xyyaw = slam.local.carried(nodes.xyyaw)
+        xyyaw = carried(slam.local, nodes.xyyaw)
         cov = carried_covariances(slam.local, nodes.xyyaw, nodes.cov)
         more = {
             "closures_switched_off": float((nodes.switches < 0.5).sum()),
