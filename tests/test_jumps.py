@@ -56,7 +56,8 @@ def closures(*moved, at_s=AT_S - 0.02, **fields):
     residual = np.tile([3.0, 0.0, 4.0], (n, 1))
     S = np.tile(np.eye(3), (n, 1, 1))
     return Innovations(
-        fields.pop("source", "loop closure"), t_ns, residual, S, fields.pop("accepted", np.ones(n, bool)),
+        fields.pop("source", "loop closure"), t_ns, residual, S,
+        fields.pop("accepted", np.ones(n, bool)),
         **{**defaults, **fields},
     )  # fmt: skip
 
