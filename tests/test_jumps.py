@@ -237,11 +237,14 @@ def test_a_smoothed_path_still_tells_what_moved_the_belief_then():
 
 
 def test_motion_that_a_ledger_holds_is_no_jump():
-    driven = closures([0.0, 0.9, 0.0], source="odometry")
+    turned = closures([0.0, 0.9, 0.0], source="odometry")
+    driven = replace(turned, residual=np.full((1, 3), np.nan))
 
     assert jumps_of(replayed(driven, smoothed=True)) == ()
     (jump,) = jumps_of(replayed(driven, closures([0.0, 0.5, 0.0])))
     assert jump.cause.startswith("loop closure")
+    (jump,) = jumps_of(replayed(turned, smoothed=True))  # held against a prediction it is one
+    assert jump.cause.startswith("odometry")
 
 
 def test_empty_tables_and_paths_make_no_traceback():

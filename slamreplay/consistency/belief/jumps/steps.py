@@ -81,7 +81,7 @@ def steps_of(
     """
     if odometry is None:
         return ()
-    corrections = [one if one.source != MOTION else None for one in ledger]
+    corrections = [None if _is_motion(one) else one for one in ledger]
     driven = odometry.at(track.t_ns).xyyaw
     rows = np.flatnonzero(track.has_pose & np.isfinite(driven).all(axis=1))
     rows = rows[np.append(True, np.diff(track.t_ns[rows]) > 0)] if len(rows) else rows
@@ -96,6 +96,11 @@ def steps_of(
         found.append(Step(before_ns, t_ns, carried[k], track.xyyaw[rows[k + 1]], made))
     found += _told_by_ledger(corrections, found)
     return tuple(sorted(found, key=lambda step: step.t_ns))
+
+
+def _is_motion(one: Innovations) -> bool:
+    """Whether its rows carry the belief on: they were held against no prediction."""
+    return one.source == MOTION and not np.isfinite(one.residual).any()
 
 
 def _maker(
