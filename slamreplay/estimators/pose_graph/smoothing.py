@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from slamreplay.estimators.pose_graph.closing import Closed
+from slamreplay.estimators.pose_graph.candidates import Closed
 from slamreplay.estimators.pose_graph.config import GraphConfig
 from slamreplay.estimators.pose_graph.refining import laid_on_passes, overlapping
 from slamreplay.estimators.pose_graph.submaps import Submaps
