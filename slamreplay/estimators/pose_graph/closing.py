@@ -26,8 +26,8 @@ ANY_HEADING = np.pi / 4.0
 #: So many matches tell whether motions err more than they say; the median of chi-square of 3
 #: degrees of freedom; and the largest ratio that is believed.
 ENOUGH, MEDIAN, MOST_RATIO = 5, 2.366, 10.0
-#: After a search of the whole map in vain so many submaps go by at the most before the next one.
-MOST_PATIENCE = 8
+#: After so many searches of the whole map in vain it is searched once in so many submaps.
+TRIES, SELDOM = 15, 5
 #: Cells in which points of two submaps are the same place, m.
 ALIKE_M = 0.2
 #: Closures that confirm each other come from submaps at most so many apart.
@@ -87,7 +87,7 @@ class Closer:
         self.loosened = np.ones(len(maps) - 1)
         self.told: list[float] = []  # NIS of good matches, had the motions erred as they say
         self._waiting: list[int] = []
-        self._not_before, self._patience = 0, 1  # when the whole map is searched next
+        self._not_before, self._in_vain = 0, 0  # when the whole map is searched next, and failures
         self._searcher = Searcher()
         self._last = maps.way[maps.stops[1:] - 1]  # way to the last node of each
 
@@ -123,9 +123,9 @@ class Closer:
             return
         found = self._placed(new, near, known, reach_m, reach_rad)
         if np.isinf(reach_m):
-            in_vain = found is None or found.score < config.min_score
-            self._patience = min(2 * self._patience, MOST_PATIENCE) if in_vain else 1
-            self._not_before = new + self._patience
+            is_in_vain = found is None or found.score < config.min_score
+            self._in_vain = self._in_vain + 1 if is_in_vain else 0
+            self._not_before = new + (SELDOM if self._in_vain > TRIES else 1)
         if found is None:
             return
         self.candidates[new] = found
