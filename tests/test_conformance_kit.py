@@ -193,6 +193,7 @@ def test_the_kit_passes_what_is_sound():
         (half_a_pose, "partly NaN"),
         (covariance_stays_where_the_map_was, "does not turn with it"),
         (ledger_knows_the_end, "ledger of the past"),
+        (lambda e, view, seed: replace(e, innovations=()), "keeps no ledger"),
         (two_of_a_name, "two sets of one source"),
         (with_ledger(source=lambda _: ""), "without a source"),
         (with_ledger(residual=lambda r: r[:, :1]), "S is of shape"),

@@ -97,6 +97,15 @@ def test_parameters_say_where_amcl_starts_and_a_perturbation_moves_that():
     np.testing.assert_allclose(moved.xyyaw[0, :2] - track.xyyaw[0, :2], [3.0, 0.0], atol=0.5)
 
 
+def test_the_pose_that_ros_1_keeps_counts_where_the_log_says_of_none():
+    kept = Amcl.from_parameters({"initial_pose_x": 1.0, "initial_pose_y": -2.0, "update_min_d": 99})
+
+    unknown, known = (kept.run(log.view(), seed=1).track for log in (NO_START, BUNDLE))
+
+    np.testing.assert_allclose(unknown.xyyaw[0, :2], [1.0, -2.0], atol=0.5)
+    assert np.hypot(*error(known)[0, :2]) < 0.3
+
+
 def test_a_random_seed_of_the_parameters_replaces_that_of_the_trial():
     fixed = Amcl.from_parameters({"random_seed": 5})
     log = synthetic_bundle(seconds=2.0).view()

@@ -56,7 +56,8 @@ def closures(*moved, at_s=AT_S - 0.02, **fields):
     residual = np.tile([3.0, 0.0, 4.0], (n, 1))
     S = np.tile(np.eye(3), (n, 1, 1))
     return Innovations(
-        "loop closure", t_ns, residual, S, fields.pop("accepted", np.ones(n, bool)),
+        fields.pop("source", "loop closure"), t_ns, residual, S,
+        fields.pop("accepted", np.ones(n, bool)),
         **{**defaults, **fields},
     )  # fmt: skip
 
@@ -233,6 +234,14 @@ def test_a_smoothed_path_still_tells_what_moved_the_belief_then():
     assert jump.step.metres == pytest.approx(0.9)
     assert jump.error_before_m is None
     assert jump.cause.startswith("loop closure node 0 -> node 17")
+
+
+def test_motion_that_a_ledger_holds_is_no_jump():
+    driven = closures([0.0, 0.9, 0.0], source="odometry")
+
+    assert jumps_of(replayed(driven, smoothed=True)) == ()
+    (jump,) = jumps_of(replayed(driven, closures([0.0, 0.5, 0.0])))
+    assert jump.cause.startswith("loop closure")
 
 
 def test_empty_tables_and_paths_make_no_traceback():

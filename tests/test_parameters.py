@@ -94,6 +94,8 @@ def test_ros_1_parameters_are_renamed_and_the_rest_has_ros_1_defaults(file):
     assert (config.alpha1, config.pf_err, config.max_beams, config.z_hit) == (0.3, 0.02, 90, 0.8)
     assert not config.squared_motion_noise
     assert (config.max_particles, config.resample_interval, config.laser_max_range) == (5000, 2, -1)
+    assert config.know_initial_pose
+    assert not config.set_initial_pose
     pose, cov = config.initial_pose
     assert pose.tolist() == [3.0, 0.0, 0.0]
     assert np.diag(cov).tolist() == [0.25, 0.25, 0.01]

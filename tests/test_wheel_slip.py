@@ -35,3 +35,15 @@ def test_amcl_widens_in_the_slip_and_contracts_after_it():
     assert with_slip.widest(first)[0] > 4.0 * without.widest(first)[0]
     assert with_slip.sigma_m[-1] < 1.3 * with_slip.sigma_at(first)
     assert with_slip.honest_share(first) > 0.9
+
+
+def test_the_pose_graph_widens_in_the_slip_and_contracts_at_the_closure():
+    slipped = round_trip(Slip(22.0, 5.0, grip=0.1, yaw_rate=0.05), 1)
+    course = course_of("pose_graph_online", bundle_of(slipped, suffix=".bag").view(), slipped, 0)
+    first, last = slip_of(slipped)
+    closure = next(t for t in course.closures_s if t > last)
+
+    assert course.sigma_at(last) > 5.0 * course.sigma_at(first)
+    assert course.sigma_at(closure + 0.5) < 0.2 * course.sigma_at(closure - 0.5)
+    assert course.honest_share(first) == 1.0
+    assert course.error_m.max() < 0.1

@@ -77,6 +77,7 @@ def check_estimator(
     _rows_follow_the_scans(estimator, bundle, baseline)
     _covariances_are_covariances(estimator, baseline)
     check_ledger(estimator.name, baseline, bundle)
+    demand(baseline.innovations, f"{estimator.name} keeps no ledger of what moved its belief")
     _references_are_not_read(estimator, baseline, run(edits.poisoned(bundle)))
     if getattr(estimator, "causal", True):
         _the_past_ignores_the_future(estimator, bundle, baseline, run)

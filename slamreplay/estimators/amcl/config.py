@@ -66,6 +66,8 @@ class AmclConfig:
         recovery_alpha_slow: decay of the slow average likelihood; 0 turns recovery off.
         recovery_alpha_fast: decay of the fast one.
         set_initial_pose: start at the pose below, unless the log has an initial pose before.
+        know_initial_pose: or only where the log says of no pose at all, as ROS 1's amcl keeps its
+            latest pose under these names: a dump need not be of the log's beginning.
         initial_pose_x: in the map, m.
         initial_pose_y: in the map, m.
         initial_pose_yaw: in the map, rad.
@@ -110,6 +112,7 @@ class AmclConfig:
     recovery_alpha_slow: float = 0.0
     recovery_alpha_fast: float = 0.0
     set_initial_pose: bool = False
+    know_initial_pose: bool = False
     initial_pose_x: float = 0.0
     initial_pose_y: float = 0.0
     initial_pose_yaw: float = 0.0
@@ -135,9 +138,7 @@ class AmclConfig:
             )
 
     @property
-    def initial_pose(self) -> tuple[Array, Array] | None:
-        """Pose (3,) and covariance (3, 3) to start with; None where the log says it."""
-        if not self.set_initial_pose:
-            return None
+    def initial_pose(self) -> tuple[Array, Array]:
+        """Pose (3,) and covariance (3, 3) that the parameters say."""
         pose = np.array([self.initial_pose_x, self.initial_pose_y, self.initial_pose_yaw])
         return pose, np.diag([self.initial_cov_xx, self.initial_cov_yy, self.initial_cov_aa])

@@ -31,9 +31,10 @@ PARTICLES, RANDOM_SEED = "particle_count", "random_seed"
 class Amcl:
     """Run the particle filter on every scan, from where the robot's own localizer started.
 
-    It starts from the initial pose in the log, else from that of the parameters, else from the
-    first recorded belief, else anywhere; every later initial pose starts it again. Between updates
-    the pose is carried by odometry, as tf does it, and the covariance stays the published one.
+    It starts from the initial pose in the log, else from that of Nav2 parameters, else from the
+    first recorded belief, else from that of ROS 1 parameters, else anywhere; every later initial
+    pose starts it again. Between updates the pose is carried by odometry, as tf does it, and the
+    covariance stays the published one.
 
     Attributes:
         config: parameters of nav2_amcl or of ROS 1's amcl.
@@ -84,10 +85,11 @@ class Amcl:
         config, seeds = self._perturbed(view, seed)
         T_odom_base = odometry.at(scans.t_ns).xyyaw
         known = np.flatnonzero(np.isfinite(T_odom_base).all(axis=1))
-        told = config.initial_pose
+        told = config.initial_pose if config.set_initial_pose else None
         given = {start.row: start for start in starts(view, scans.t_ns, T_odom_base, told)}
         if not given and len(known):
-            given = {int(known[0]): Start(int(known[0]), None, DEFAULT_COV)}
+            pose, cov = config.initial_pose if config.know_initial_pose else (None, DEFAULT_COV)
+            given = {int(known[0]): Start(int(known[0]), pose, cov)}
         amcl = AmclFilter(config, grid, seeds)
         quantile = ScanQuantile(config, grid, amcl.distance_m, seeds)
         matcher = ScanMatcher(config, grid, amcl.distance_m)

@@ -91,7 +91,7 @@ LIVE = (
     "std_warn_level_*",
 )
 
-_OURS = frozenset({"motion_model", "squared_motion_noise"})
+_OURS = frozenset({"motion_model", "squared_motion_noise", "know_initial_pose"})
 NAMES = frozenset(
     ({f.name for f in fields(AmclConfig)} - _OURS)
     | set(_NAV2)
@@ -104,7 +104,7 @@ def config_from(given: Mapping[str, object], where: str = "amcl") -> AmclConfig:
     """The configuration that parameters of either node make.
 
     A name that only ROS 1 has makes the rest be of ROS 1, too: its defaults hold for what is not
-    given, and it always starts at its initial pose, where one is given.
+    given, and an initial pose is where it starts if the log says of none.
 
     Raises:
         UsageError: a name that neither node has, one that is given twice in two spellings, or a
@@ -130,7 +130,7 @@ def config_from(given: Mapping[str, object], where: str = "amcl") -> AmclConfig:
         return settings_from(AmclConfig, values, where=where, known=tuple(NAMES))
     defaults = {f.name: getattr(_ROS_1_DEFAULTS, f.name) for f in fields(AmclConfig)}
     if any(name.startswith("initial_pose_") for name in values):
-        defaults["set_initial_pose"] = True
+        defaults["know_initial_pose"] = True
     config = settings_from(AmclConfig, {**defaults, **values}, where=where, known=tuple(NAMES))
     if config.motion_model == "omnidirectional":
         return replace(config, alpha1=config.alpha4, alpha4=config.alpha1)

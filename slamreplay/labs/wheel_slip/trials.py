@@ -88,7 +88,12 @@ def course_of(name: str, view: BundleView, recording: Recording, seed: int) -> C
     if not ESTIMATED[name]:  # in a frame of its own, which is where it began
         believed = se2.compose(true[0], se2.between(believed[0], believed))
     off = believed - true
-    taken = [i.t_ns[i.accepted] for i in estimate.innovations if i.source == CLOSURES]
+    # A closure that waited for others moved nothing yet when it was found.
+    taken = [
+        i.t_ns[i.accepted & np.isfinite(i.moved).all(axis=1)]
+        for i in estimate.innovations
+        if i.source == CLOSURES
+    ]
     times = np.unique(np.concatenate(taken)) if taken else np.empty(0, dtype=np.int64)
     return Course(
         t_s,

@@ -12,6 +12,8 @@ from slamreplay.bundle.run import Innovations
 from slamreplay.bundle.track import PoseTrack
 from slamreplay.geometry import se2
 
+#: The source whose rows are the robot's own motion, which is no step of the belief.
+MOTION = "odometry"
 #: A step by this is worth a word.
 WORD_M, WORD_RAD = 0.2, float(np.radians(10.0))
 #: A step by this is as large as the error of a lost robot.
@@ -79,6 +81,7 @@ def steps_of(
     """
     if odometry is None:
         return ()
+    corrections = [one if one.source != MOTION else None for one in ledger]
     driven = odometry.at(track.t_ns).xyyaw
     rows = np.flatnonzero(track.has_pose & np.isfinite(driven).all(axis=1))
     rows = rows[np.append(True, np.diff(track.t_ns[rows]) > 0)] if len(rows) else rows
@@ -89,16 +92,20 @@ def steps_of(
     found = []
     for k in np.flatnonzero(large).tolist():
         before_ns, t_ns = int(track.t_ns[rows[k]]), int(track.t_ns[rows[k + 1]])
-        made = _maker(ledger, before_ns, t_ns)
+        made = _maker(corrections, before_ns, t_ns)
         found.append(Step(before_ns, t_ns, carried[k], track.xyyaw[rows[k + 1]], made))
-    found += _told_by_ledger(ledger, found)
+    found += _told_by_ledger(corrections, found)
     return tuple(sorted(found, key=lambda step: step.t_ns))
 
 
-def _maker(ledger: Sequence[Innovations], before_ns: int, t_ns: int) -> tuple[int, int] | None:
+def _maker(
+    ledger: Sequence[Innovations | None], before_ns: int, t_ns: int
+) -> tuple[int, int] | None:
     """The accepted row between two times, the latter included, that moved the belief most."""
     best, most = None, -1.0
     for k, one in enumerate(ledger):
+        if one is None:
+            continue
         rows = np.flatnonzero(one.accepted & (one.t_ns > before_ns) & (one.t_ns <= t_ns))
         sizes = np.nan_to_num(sizes_of(one.moved[rows]))
         if len(rows) and sizes.max() > most:
@@ -106,12 +113,14 @@ def _maker(ledger: Sequence[Innovations], before_ns: int, t_ns: int) -> tuple[in
     return best
 
 
-def _told_by_ledger(ledger: Sequence[Innovations], found: Sequence[Step]) -> list[Step]:
+def _told_by_ledger(ledger: Sequence[Innovations | None], found: Sequence[Step]) -> list[Step]:
     """Accepted rows that moved the belief by as much, outside of the steps that were found."""
     low = np.array([step.before_ns for step in found], dtype=np.int64)
     high = np.array([step.t_ns for step in found], dtype=np.int64)
     more = []
     for k, one in enumerate(ledger):
+        if one is None:
+            continue
         metres, radians = np.hypot(one.moved[:, 0], one.moved[:, 1]), np.abs(one.moved[:, 2])
         large = one.accepted & ((metres >= WORD_M) | (radians >= WORD_RAD))
         for row in np.flatnonzero(large).tolist():
