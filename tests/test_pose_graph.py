@@ -8,8 +8,9 @@ import pytest
 
 from slamreplay.bundle.track import PoseTrack
 from slamreplay.errors import NotApplicableError, UsageError
+from slamreplay.estimators.pose_graph.candidates import Candidate, relations_of
 from slamreplay.estimators.pose_graph.carrying import carried, carried_covariances
-from slamreplay.estimators.pose_graph.closing import Candidate, Closer, relations_of
+from slamreplay.estimators.pose_graph.closing import Closer
 from slamreplay.estimators.pose_graph.config import GraphConfig
 from slamreplay.estimators.pose_graph.doubt import doubted
 from slamreplay.estimators.pose_graph.estimator import PoseGraph, PoseGraphOnline

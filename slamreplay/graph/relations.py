@@ -84,6 +84,7 @@ def solved(
     doubtful: Relations | None = None,
     phi: float | None = None,
     with_cov: bool = False,
+    most_steps: int = _MOST_STEPS,
 ) -> Solution:
     """Optimise poses by Levenberg and Marquardt's method.
 
@@ -95,11 +96,12 @@ def solved(
         phi: and this parameter of their dynamic covariance scaling: one of a larger chi-square is
             switched off gradually. None takes them as firm.
         with_cov: whether covariances are worked out.
+        most_steps: how many wider scalings come before that one: fewer where the guess is near.
     """
     doubtful = Relations.none() if doubtful is None else doubtful
     held = [prior(initial[0], first_cov), *factors_of(firm)]
     xyyaw = initial
-    for width in _widths(doubtful, initial, phi):
+    for width in _widths(doubtful, initial, phi, most_steps):
         graph, values = gtsam.NonlinearFactorGraph(), gtsam.Values()
         for k, pose in enumerate(xyyaw.tolist()):
             values.insert(k, gtsam.Pose2(*pose))
@@ -118,7 +120,9 @@ def solved(
     return Solution(xyyaw, cov)
 
 
-def _widths(doubtful: Relations, initial: se2.Array, phi: float | None) -> list[float | None]:
+def _widths(
+    doubtful: Relations, initial: se2.Array, phi: float | None, most_steps: int
+) -> list[float | None]:
     """Parameters of one optimisation after the other.
 
     Where drift has put a first guess far off, a narrow scaling would switch off what is true. So it
@@ -129,7 +133,7 @@ def _widths(doubtful: Relations, initial: se2.Array, phi: float | None) -> list[
         return [None]
     largest = float(doubtful.chi2(initial).max())
     steps = int(np.ceil(np.log(max(largest / phi, 1.0)) / np.log(_NARROWER)))
-    return [phi * _NARROWER**k for k in range(min(steps, _MOST_STEPS), -1, -1)]
+    return [phi * _NARROWER**k for k in range(min(steps, most_steps), -1, -1)]
 
 
 def prior(xyyaw: se2.Array, cov: se2.Array, key: int = 0) -> gtsam.NonlinearFactor:

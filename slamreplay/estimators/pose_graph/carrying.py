@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slamreplay.estimators.pose_graph.beginning import Beginning
-from slamreplay.estimators.pose_graph.closing import Closed
+from slamreplay.estimators.pose_graph.candidates import Closed
 from slamreplay.estimators.pose_graph.submaps import Submaps, chain_covariances
 from slamreplay.estimators.scan_matching.local import LocalTrajectory
 from slamreplay.geometry import se2

@@ -6,18 +6,18 @@ and tells how far each closure moved the belief when it was found.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from slamreplay.estimators.pose_graph.candidates import Candidate, Closed, relations_of
 from slamreplay.estimators.pose_graph.config import GraphConfig
 from slamreplay.estimators.pose_graph.placing import Searcher, information_of
 from slamreplay.estimators.pose_graph.submaps import Submaps
 from slamreplay.geometry import se2
 from slamreplay.geometry.covariance import composed, turned
 from slamreplay.graph.online import OnlineGraph
-from slamreplay.graph.relations import Relations
 
 #: A place is searched this many standard deviations about where it is expected, and a bit more.
 SIGMAS, MARGIN_M, MARGIN_RAD = 3.0, 0.1, np.radians(2.0)
@@ -26,76 +26,12 @@ ANY_HEADING = np.pi / 4.0
 #: So many matches tell whether motions err more than they say; the median of chi-square of 3
 #: degrees of freedom; and the largest ratio that is believed.
 ENOUGH, MEDIAN, MOST_RATIO = 5, 2.366, 10.0
+#: After so many searches of the whole map in vain it is searched once in so many submaps.
+TRIES, SELDOM = 15, 5
 #: Cells in which points of two submaps are the same place, m.
 ALIKE_M = 0.2
 #: Closures that confirm each other come from submaps at most so many apart.
 TOGETHER = 6
-
-
-@dataclass(frozen=True, eq=False)
-class Candidate:
-    """A place that was found for a submap, taken or not.
-
-    Attributes:
-        old: submap that it was laid on.
-        new: submap that was laid.
-        xyyaw: (3,) the new one's reference seen from the old one's.
-        cov: (3, 3) of it, about axes of the old one.
-        score: 0 to 1.
-        residual: (3,) measured minus predicted.
-        S: (3, 3) covariance predicted for it: of the prediction and of the match.
-        nis: r' S^-1 r.
-        yaw: heading of the old one's reference at that time, rad; it turns axes into the graph's.
-        accepted: whether the graph took it in.
-        moved: (3,) by how much the new submap moved when it was taken in; NaN where it waited for
-            others, with which it was taken in later.
-    """
-
-    old: int
-    new: int
-    xyyaw: se2.Array
-    cov: se2.Array
-    score: float
-    residual: se2.Array
-    S: se2.Array
-    nis: float
-    yaw: float = 0.0
-    accepted: bool = False
-    moved: se2.Array = field(default_factory=lambda: np.zeros(3))
-
-
-@dataclass(frozen=True, eq=False)
-class Closed:
-    """What a pass over the submaps found.
-
-    Attributes:
-        candidates: in the order in which they were found.
-        belief: (C, 3) where each submap's reference was believed to be once it was done.
-        belief_cov: (C, 3, 3) of it, about the parent's axes; empty where not asked for.
-        poses: (C, 3) where all are at the end.
-        loosened: (C - 1,) ratios by which covariances of the motions grew.
-    """
-
-    candidates: tuple[Candidate, ...]
-    belief: se2.Array
-    belief_cov: se2.Array
-    poses: se2.Array
-    loosened: se2.Array
-
-    def relations(self) -> Relations:
-        """The accepted ones, between submaps."""
-        return relations_of([c for c in self.candidates if c.accepted])
-
-
-def relations_of(candidates: list[Candidate]) -> Relations:
-    """Candidates as relations between submaps."""
-    if not candidates:
-        return Relations.none()
-    return Relations(
-        np.array([[c.old, c.new] for c in candidates]),
-        np.array([c.xyyaw for c in candidates]),
-        np.array([c.cov for c in candidates]),
-    )
 
 
 def close_loops(
@@ -151,6 +87,7 @@ class Closer:
         self.loosened = np.ones(len(maps) - 1)
         self.told: list[float] = []  # NIS of good matches, had the motions erred as they say
         self._waiting: list[int] = []
+        self._not_before, self._in_vain = 0, 0  # when the whole map is searched next, and failures
         self._searcher = Searcher()
         self._last = maps.way[maps.stops[1:] - 1]  # way to the last node of each
 
@@ -182,9 +119,13 @@ class Closer:
         reach_rad = np.pi if reach_rad > ANY_HEADING else float(reach_rad)
         reach_m = np.inf if reach_m > config.window_m else reach_m
         known = old[away < config.reach_m + reach_m]
-        if not len(known):
+        if not len(known) or (np.isinf(reach_m) and new < self._not_before):
             return
         found = self._placed(new, near, known, reach_m, reach_rad)
+        if np.isinf(reach_m):
+            is_in_vain = found is None or found.score < config.min_score
+            self._in_vain = self._in_vain + 1 if is_in_vain else 0
+            self._not_before = new + (SELDOM if self._in_vain > TRIES else 1)
         if found is None:
             return
         self.candidates[new] = found
@@ -206,7 +147,12 @@ class Closer:
         ]
         expected = se2.between(poses[near], poses[new])
         place = self._searcher.best(
-            np.concatenate(clouds), maps.clouds[new], expected, reach_m, reach_rad
+            np.concatenate(clouds),
+            maps.clouds[new],
+            expected,
+            reach_m,
+            reach_rad,
+            self.config.min_score,
         )
         if place is None:
             return None

@@ -20,8 +20,8 @@ SIGMA_M, FINE_M, COARSE_M = 0.08, 0.05, 0.1
 WIDE_M, COARSE_FROM_M = 0.5, 1.5
 #: Points of a submap that are searched with, and how far from its middle they may lie.
 MOST_POINTS, FARTHEST_M = 200, 20.0
-#: A window must score at least this for it to be climbed to the top.
-HOPELESS = 0.3
+#: What is found by branch and bound must score at least this part of what is asked for.
+HOPELESS = 0.8
 #: More cells than this are never drawn at once.
 ROOM = 9_000_000
 #: Information that any match has: 10 m, 10 rad.
@@ -51,6 +51,7 @@ class Searcher:
         expected: se2.Array,
         reach_m: float,
         reach_rad: float,
+        min_score: float,
     ) -> Place | None:
         """The best place of a window.
 
@@ -60,9 +61,10 @@ class Searcher:
             expected: (3,) where it should be.
             reach_m: to either side; infinite for the whole map.
             reach_rad: to either side; from pi on all headings.
+            min_score: what is asked for. A wide window is not searched for what is far below.
 
         Returns:
-            None where nothing fits at all.
+            None where nothing fits.
         """
         near = np.hypot(cloud[:, 0], cloud[:, 1]) < FARTHEST_M
         few = _evenly(cloud[near], MOST_POINTS)
@@ -71,7 +73,7 @@ class Searcher:
         spread = float(np.hypot(few[:, 0], few[:, 1]).max()) + 1.0
         start = expected
         if reach_m > WIDE_M or reach_rad > np.pi / 6.0:
-            start_ = self._wide(seen, few, expected, reach_m, reach_rad, spread)
+            start_ = self._wide(seen, few, expected, reach_m, reach_rad, spread, min_score)
             if start_ is None:
                 return None
             start, reach_m = start_, 0.3
@@ -92,6 +94,7 @@ class Searcher:
         reach_m: float,
         reach_rad: float,
         spread: float,
+        min_score: float,
     ) -> se2.Array | None:
         cell = COARSE_M if reach_m > COARSE_FROM_M else FINE_M
         field = self._field(seen, expected, spread + reach_m, cell)
@@ -99,7 +102,8 @@ class Searcher:
             window = PoseWindow(expected, (reach_m, reach_m), reach_rad)
         else:
             window = PoseWindow.whole(field)
-        top = best_pose(pyramid(field), few, window, step_rad=cell / 5.0, min_score=HOPELESS)
+        least = HOPELESS * min_score
+        top = best_pose(pyramid(field), few, window, step_rad=cell / 5.0, min_score=least)
         return None if top is None else top.xyyaw
 
     def _field(self, seen: se2.Array, about: se2.Array, reach_m: float, cell_m: float):  # type: ignore[no-untyped-def]

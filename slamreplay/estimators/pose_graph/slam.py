@@ -11,7 +11,8 @@ from slamreplay.bundle.view import BundleView
 from slamreplay.errors import NotApplicableError
 from slamreplay.estimators.inputs import need_scans
 from slamreplay.estimators.pose_graph.beginning import Beginning, beginning
-from slamreplay.estimators.pose_graph.closing import Closed, close_loops
+from slamreplay.estimators.pose_graph.candidates import Closed
+from slamreplay.estimators.pose_graph.closing import close_loops
 from slamreplay.estimators.pose_graph.config import GraphConfig
 from slamreplay.estimators.pose_graph.doubt import doubted
 from slamreplay.estimators.pose_graph.smoothing import Smoothed, smoothed

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from slamreplay.estimators.pose_graph.closing import Closed
+from slamreplay.estimators.pose_graph.candidates import Closed
 from slamreplay.estimators.pose_graph.config import GraphConfig
 from slamreplay.estimators.pose_graph.refining import laid_on_passes, overlapping
 from slamreplay.estimators.pose_graph.submaps import Submaps
@@ -79,13 +79,15 @@ def smoothed(
         if not len(pairs):
             break
         passes = laid_on_passes(lines, pairs, poses, number, config, match_scale).relations
-        after = solved(poses, first_cov, motions, joined(closures, passes), config.phi).xyyaw
+        doubtful = joined(closures, passes)
+        after = solved(poses, first_cov, motions, doubtful, config.phi, most_steps=1).xyyaw
         step = np.hypot(*(after - poses)[:, :2].T)
         poses = after
         moved.append(float(step.mean()))
         if moved[-1] < STILL_M:
             break
-    end = solved(poses, first_cov, motions, joined(closures, passes), config.phi, with_cov=True)
+    doubtful = joined(closures, passes)
+    end = solved(poses, first_cov, motions, doubtful, config.phi, with_cov=True, most_steps=0)
     switches = closures.switches(end.xyyaw, config.phi)
     return Smoothed(end.xyyaw, end.cov, closures, switches, passes, tuple(moved))
 
