@@ -219,6 +219,18 @@ def test_a_bare_corridor_keeps_to_odometry_and_the_covariance_says_so():
     assert (along > 4.0 * across).all()
 
 
+def test_reverse_driving_that_odometry_tells_as_forward():
+    """Down a corridor, away from its end, which is out of reach after 6 m."""
+    truth = np.column_stack([np.arange(0.0, -8.0, -0.1), np.zeros((80, 2))])
+    ahead = np.cos(BEARINGS) > 0.02
+    end = np.where(ahead, (2.0 - truth[:, :1]) / np.where(ahead, np.cos(BEARINGS), 1.0), np.inf)
+    sides = corridor_scans(truth)
+    ranges = np.minimum(np.where(sides < 5.0, sides, np.inf), np.where(sides < end, np.inf, end))
+    local = run_local(scans_of(ranges, np.abs(truth), max_m=8.0))
+    np.testing.assert_allclose(local.xyyaw[:55, 0], truth[:55, 0], atol=0.03)
+    assert local.xyyaw[-1, 0] < -5.0  # and not forward by 2 m, as odometry has it
+
+
 def test_a_robot_that_is_carried_away_begins_a_new_map():
     truth = way(6.0)
     elsewhere = corridor_scans(np.zeros((20, 3)))

@@ -26,10 +26,16 @@ REFUTED_NIS = 16.0
 #: Where no odometry tells a step the speed of before is expected: it is known to this part, and to
 #: this at the least, m and rad.
 GUESS_PART, GUESS_M, GUESS_RAD = 0.5, 0.03, 0.03
+#: How fast the pace follows, and how much of it is kept from scan to scan: along a corridor nothing
+#: else would ever slow it down.
+PACE_RATE, PACE_KEPT = 0.7, 0.97
 #: Where odometry has a gap, to these.
 BRIDGED_PART, BRIDGED_M, BRIDGED_RAD = 0.5, 0.02, 0.02
 #: What a scan's pose misses that nothing else shows, at the least, m and rad.
 JITTER_M, JITTER_RAD = 0.001, 0.0005
+#: Odometry that is refuted more often than this of late predicts nothing: it may be stale, or tell
+#: reverse driving as forward. How fast that is learned.
+DISTRUSTED, DISTRUST_RATE = 0.5, 0.1
 #: How fast what odometry does not tell is learned. A sweep laid out by the last motion alone would
 #: swing up: an error of it makes one of the next with the other sign, and of about its size. Less
 #: than this, m and rad, is not told from errors of matches.
@@ -56,27 +62,31 @@ class Follower:
         pose: (3,) of the last scan.
         cov: (3, 3) of it against the last node, about axes of the local frame.
         carried: (3, 3) of it, had nothing been matched since.
-        motion: (3,) from the scan before, in the axes of the base there.
+        pace: (3,) motion from scan to scan of late, in the axes of the base.
         unsaid: (3,) what odometry did not tell of it, over the last scans; all of it where there is
             none.
         learned: (3,) what odometry misses, as in `fusion.predict`.
         typical: score of the last matches.
         variance: of a point about its line in them, m^2.
+        matches: how many were taken so far.
         lost: how many scans one after another matched nothing.
-        is_refuted: odometry and the last scan told of different motions.
+        is_refuted: prediction and the last scan told of different motions.
+        distrust: how often scans refuted odometry of late, 0 to 1.
     """
 
     config: MatchConfig
     pose: se2.Array = field(default_factory=lambda: np.zeros(3))
     cov: se2.Array = field(default_factory=lambda: np.zeros((3, 3)))
     carried: se2.Array = field(default_factory=lambda: np.zeros((3, 3)))
-    motion: se2.Array = field(default_factory=lambda: np.zeros(3))
+    pace: se2.Array = field(default_factory=lambda: np.zeros(3))
     unsaid: se2.Array = field(default_factory=lambda: np.zeros(3))
     learned: se2.Array = field(default_factory=lambda: np.array(_LIKELY))
     typical: float = 0.85
     variance: float = 0.02**2
+    matches: int = 0
     lost: int = 0
     is_refuted: bool = False
+    distrust: float = 0.0
 
     def __post_init__(self) -> None:
         c = self.config
@@ -159,8 +169,8 @@ class Follower:
 
     def _predicted(self, step: se2.Array, *, is_bridged: bool) -> se2.Array:
         least, self._step = _LEAST, np.where(np.isfinite(step), step, 0.0)
-        if step[0] != step[0]:
-            step = self.motion
+        if step[0] != step[0] or self.distrust > DISTRUSTED:
+            step = self.pace
             least = GUESS_PART * _size(step) + (GUESS_M, GUESS_RAD)
         elif is_bridged:
             least = BRIDGED_PART * _size(step) + (BRIDGED_M, BRIDGED_RAD)
@@ -225,7 +235,7 @@ class Follower:
 
     def _places(self, points: se2.Array, before: se2.Array) -> Iterator[se2.Array]:
         """Where the scan might lie (3,): at the speed of before, then wherever it is found."""
-        yield se2.compose(before, self.motion)
+        yield se2.compose(before, self.pace)
         if self._field is None:
             self._field = rescue.search_field(self.map, before)
         if self._field is not None:
@@ -237,26 +247,41 @@ class Follower:
     def _accepted(self, prior: se2.Array, pose: se2.Array, score: float, nis: float) -> Fit:
         told, moved = self._told, _off(pose, prior)
         self.is_refuted = nis > REFUTED_NIS
+        self._judge_odometry(pose)
         if self.is_refuted:  # wheels that slip, a robot that is carried
             self.carried += np.outer(moved, moved)
         fusion.both(self.carried, told[12:21].reshape(3, 3), self.cov, self._room)
         fusion.learn(self._noise, told, self.learned)
-        self.typical += RATE * (score - self.typical)
+        self.matches += 1
+        rate = max(RATE, 1.0 / (1.0 + self.matches))
+        self.typical += rate * (score - self.typical)
         self.variance += RATE * (self._squares - self.variance)
         self.lost = 0
         (x, y, yaw), c, s = _off(pose, self.pose), np.cos(self.pose[2]), np.sin(self.pose[2])
-        self.motion = np.array([c * x + s * y, c * y - s * x, yaw])
-        unsaid = np.clip(self.motion - self._step, -_MOST_UNSAID, _MOST_UNSAID)
+        motion = np.array([c * x + s * y, c * y - s * x, yaw])
+        self.pace = PACE_KEPT * (self.pace + PACE_RATE * (motion - self.pace))
+        unsaid = np.clip(motion - self._step, -_MOST_UNSAID, _MOST_UNSAID)
         self.unsaid += STEADY_RATE * (unsaid - self.unsaid)
         self.pose = pose
         S = told[3:12].reshape(3, 3).copy()
         return Fit(pose, told[:3].copy(), S, score, accepted=True, moved=moved)
 
+    def _judge_odometry(self, pose: se2.Array) -> None:
+        """Learn whether odometry is right, where the match would tell it from standing still."""
+        way, turn = _size(self._step)
+        noise = self._per_way[::2] ** 2 * way + self._per_way[1::2] ** 2 * turn + _LEAST**2
+        S = np.linalg.inv(self._told[12:21].reshape(3, 3)) + np.diag(noise[[0, 0, 1]])
+        told = se2.compose(self.pose, self._step)
+        off, step = np.stack([_off(pose, told), _off(told, self.pose)])
+        nis_off, nis_step = (v @ np.linalg.solve(S, v) for v in (off, step))
+        if nis_off > REFUTED_NIS or nis_step > REFUTED_NIS:
+            self.distrust += DISTRUST_RATE * ((nis_off > REFUTED_NIS) - self.distrust)
+
     def _missed(self, prior: se2.Array, score: float) -> Fit:
         """Go on by odometry alone."""
         self.pose = prior
         self.cov = self.carried.copy()
-        self.motion, self.unsaid = np.zeros(3), np.zeros(3)
+        self.pace, self.unsaid = np.zeros(3), np.zeros(3)
         residual, S = np.full(3, np.nan), np.full((3, 3), np.nan)
         if score == score:
             self.lost += 1
