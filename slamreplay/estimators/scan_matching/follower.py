@@ -268,14 +268,11 @@ class Follower:
 
     def _judge_odometry(self, pose: se2.Array) -> None:
         """Learn whether odometry is right, where the match would tell it from standing still."""
-        way, turn = _size(self._step)
-        noise = self._per_way[::2] ** 2 * way + self._per_way[1::2] ** 2 * turn + _LEAST**2
-        S = np.linalg.inv(self._told[12:21].reshape(3, 3)) + np.diag(noise[[0, 0, 1]])
-        told = se2.compose(self.pose, self._step)
-        off, step = np.stack([_off(pose, told), _off(told, self.pose)])
-        nis_off, nis_step = (v @ np.linalg.solve(S, v) for v in (off, step))
-        if nis_off > REFUTED_NIS or nis_step > REFUTED_NIS:
-            self.distrust += DISTRUST_RATE * ((nis_off > REFUTED_NIS) - self.distrust)
+        wrong, moved = fusion.judged(
+            self.pose, self._step, pose, self._per_way, _LEAST, self._told[12:21], self._room
+        )
+        if max(wrong, moved) > REFUTED_NIS:
+            self.distrust += DISTRUST_RATE * ((wrong > REFUTED_NIS) - self.distrust)
 
     def _missed(self, prior: se2.Array, score: float) -> Fit:
         """Go on by odometry alone."""
