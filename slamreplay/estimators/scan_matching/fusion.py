@@ -197,47 +197,6 @@ def both(carried, information, out, room):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def judged(before, step, pose, per_way, least, information, room):  # type: ignore[no-untyped-def]
-    """How far odometry is from a match, and from telling nothing: e' S^-1 e of both.
-
-    Args:
-        before: (3,) pose of the scan before.
-        step: (3,) odometry's motion from there, in the axes of the base.
-        pose: (3,) of the match.
-        per_way: (4,) as in `predict`.
-        least: (2,) as in `predict`.
-        information: (9,) of the match.
-        room: (3, 3, 3) scratch.
-    """
-    A, S, W = room[0], room[1], room[2]
-    for i in range(3):
-        for j in range(3):
-            A[i, j] = information[3 * i + j]
-    inverse(A, S)
-    way, turn = np.hypot(step[0], step[1]), abs(step[2])
-    position = per_way[0] ** 2 * way + per_way[1] ** 2 * turn + least[0] ** 2
-    S[0, 0] += position
-    S[1, 1] += position
-    S[2, 2] += per_way[2] ** 2 * way + per_way[3] ** 2 * turn + least[1] ** 2
-    inverse(S, W)
-    cos, sin = np.cos(before[2]), np.sin(before[2])
-    dx, dy = cos * step[0] - sin * step[1], sin * step[0] + cos * step[1]
-    yaw = pose[2] - before[2] - step[2]
-    off = (
-        pose[0] - before[0] - dx,
-        pose[1] - before[1] - dy,
-        (yaw + np.pi) % (2.0 * np.pi) - np.pi,
-    )
-    told = (dx, dy, step[2])
-    wrong = moved = 0.0
-    for i in range(3):
-        for j in range(3):
-            wrong += off[i] * W[i, j] * off[j]
-            moved += told[i] * W[i, j] * told[j]
-    return wrong, moved
-
-
-@njit(cache=True, nogil=True)
 def carry_on(carried, dx, dy, noise, room):  # type: ignore[no-untyped-def]
     """Odometry's covariance since the node, one step on, in place."""
     out = room[0]
