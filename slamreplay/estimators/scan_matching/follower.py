@@ -35,7 +35,7 @@ BRIDGED_PART, BRIDGED_M, BRIDGED_RAD = 0.5, 0.02, 0.02
 JITTER_M, JITTER_RAD = 0.001, 0.0005
 #: Odometry that is refuted more often than this of late predicts nothing: it may be stale, or tell
 #: reverse driving as forward. How fast that is learned.
-DISTRUSTED, DISTRUST_RATE = 0.5, 0.1
+DISTRUSTED, TRUSTED, DISTRUST_RATE = 0.5, 0.05, 0.1
 #: How fast what odometry does not tell is learned. A sweep laid out by the last motion alone would
 #: swing up: an error of it makes one of the next with the other sign, and of about its size. Less
 #: than this, m and rad, is not told from errors of matches.
@@ -268,14 +268,16 @@ class Follower:
 
     def _judge_odometry(self, pose: se2.Array) -> None:
         """Learn whether odometry is right, where the match would tell it from standing still."""
+        if not self.is_refuted and self.distrust < TRUSTED:
+            return
         way, turn = _size(self._step)
         noise = self._per_way[::2] ** 2 * way + self._per_way[1::2] ** 2 * turn + _LEAST**2
         S = np.linalg.inv(self._told[12:21].reshape(3, 3)) + np.diag(noise[[0, 0, 1]])
         told = se2.compose(self.pose, self._step)
-        off, step = np.stack([_off(pose, told), _off(told, self.pose)])
-        nis_off, nis_step = (v @ np.linalg.solve(S, v) for v in (off, step))
-        if nis_off > REFUTED_NIS or nis_step > REFUTED_NIS:
-            self.distrust += DISTRUST_RATE * ((nis_off > REFUTED_NIS) - self.distrust)
+        both = np.stack([_off(pose, told), _off(told, self.pose)])
+        wrong, moved = (both.T * np.linalg.solve(S, both.T)).sum(axis=0)
+        if max(wrong, moved) > REFUTED_NIS:
+            self.distrust += DISTRUST_RATE * ((wrong > REFUTED_NIS) - self.distrust)
 
     def _missed(self, prior: se2.Array, score: float) -> Fit:
         """Go on by odometry alone."""

@@ -12,7 +12,7 @@ from slamreplay.matching.field import ScoreField, points_field
 from slamreplay.matching.line_map import LineMap
 
 #: Width of the score around what the map holds, and how far from the robot it is taken from.
-SIGMA_M, RADIUS_M = 0.1, 20.0
+SIGMA_M, RADIUS_M = 0.1, 15.0
 WINDOWS = (
     Window(0.3, 0.1, np.radians(15.0), np.radians(2.0), pull=0.03),
     Window(1.2, 0.1, np.radians(30.0), np.radians(2.0), pull=0.03),
