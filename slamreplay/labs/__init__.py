@@ -10,6 +10,7 @@ LABS = Registry(
     "lab",
     {
         "covariance_breathing": "slamreplay.labs.covariance_breathing.lab:CovarianceBreathing",
+        "false_closures": "slamreplay.labs.false_closures.lab:FalseClosures",
         "interval_calibration": "slamreplay.labs.interval_calibration.lab:IntervalCalibration",
         "joint_estimation": "slamreplay.labs.joint_estimation.lab:JointEstimation",
         "two_run": "slamreplay.labs.two_run.lab:TwoRun",

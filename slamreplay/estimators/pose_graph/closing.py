@@ -117,7 +117,7 @@ class Closer:
         sigma = float(np.sqrt(np.linalg.eigvalsh(S[:2, :2])[-1]))
         reach_m, reach_rad = SIGMAS * sigma + MARGIN_M, SIGMAS * np.sqrt(S[2, 2]) + MARGIN_RAD
         reach_rad = np.pi if reach_rad > ANY_HEADING else float(reach_rad)
-        reach_m = np.inf if reach_m > config.window_m else reach_m
+        reach_m = np.inf if reach_m > config.window_m else max(reach_m, config.least_window_m)
         known = old[away < config.reach_m + reach_m]
         if not len(known) or (np.isinf(reach_m) and new < self._not_before):
             return

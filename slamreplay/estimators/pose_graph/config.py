@@ -17,6 +17,8 @@ class GraphConfig:
         reach_m: two submaps may show the same things from this far apart, m.
         window_m: the farthest to either side that a place is searched; where the graph is not sure
             to within it the whole map is searched, m.
+        least_window_m: and the least to either side; 0 trusts the graph's own covariance, where
+            Cartographer searches 7 m whatever it knows (`linear_search_window` of pose_graph.lua).
         sure_m: where the graph knows a place to this (standard deviation) a closure is taken as it
             is; elsewhere it must be confirmed, m.
         confirmations: by so many others that it agrees with. The same lets in what speaks against
@@ -39,6 +41,7 @@ class GraphConfig:
     apart_m: float = 10.0
     reach_m: float = 6.0
     window_m: float = 8.0
+    least_window_m: float = 0.0
     sure_m: float = 0.4
     confirmations: int = 2
     gate: float = 16.27

@@ -1,0 +1,1 @@
+"""Closures that are false, over the score that they need to be taken."""
