@@ -53,18 +53,25 @@ Seed = Annotated[
     typer.Option("--seed", help="Seed of every random number; 0, or the recipe's own."),
 ]
 
-_COLUMNS = (
+_POSES = (("poses", "rows_with_pose"),)
+_FROM_BASELINE = (
     ("median [m]", "baseline_median_m"),
     ("max [m]", "baseline_max_m"),
     ("end [m]", "baseline_final_m"),
     ("max [rad]", "baseline_max_rad"),
-    ("rmse to ref. [m]", "reference_rmse_m"),
 )
-#: Shown only where any run has them.
+_REFERENCE = (("rmse to ref. [m]", "reference_rmse_m"),)
 _ALIGNED = (("ATE aligned [m]", "ate_aligned_m"),)
 _NEES = (("mean NEES", "nees_mean"), ("by chance (95 %)", "nees_interval"))
 _RELATIONS = (("relations [m]", "relations_m"), ("relations [rad]", "relations_rad"))
-
+#: Columns, and the number without which in any row they are left out.
+_GROUPS = (
+    (_POSES, "rows"),
+    (_REFERENCE, "reference_rmse_m"),
+    (_ALIGNED, "ate_aligned_m"),
+    (_NEES, "nees_mean"),
+    (_RELATIONS, "relations_n"),
+)
 _FINE = {key for _, key in _RELATIONS}
 
 
@@ -178,12 +185,9 @@ def perturb(
 def _text(rows: list[dict[str, Any]]) -> str:
     """The trials as a table: every estimator's baseline, and below it what changes from it."""
     order = list(dict.fromkeys(str(row["estimator"]) for row in rows))
-    columns = list(_COLUMNS)
-    for group, key in (
-        (_ALIGNED, "ate_aligned_m"),
-        (_NEES, "nees_mean"),
-        (_RELATIONS, "relations_n"),
-    ):
+    is_compared = any(row["perturbation"] for row in rows)
+    columns = list(_FROM_BASELINE) if is_compared else []
+    for group, key in _GROUPS:
         columns += group if any(row["metrics"][key] for row in rows) else ()
     lines = [["estimator", "perturbation", "level", *(title for title, _ in columns)]]
     for row in sorted(rows, key=lambda row: order.index(str(row["estimator"]))):
@@ -211,4 +215,6 @@ def _number(metrics: Metrics, key: str) -> str:
         low, high = metrics["nees_low"], metrics["nees_high"]
         return "-" if low is None or high is None else f"{low:.2f} to {high:.2f}"
     value = metrics[key]
-    return "-" if value is None else f"{value:.4f}" if key in _FINE else f"{value:.3f}"
+    if value is None:
+        return "-"
+    return f"{value:.{0 if key == 'rows_with_pose' else 4 if key in _FINE else 3}f}"
