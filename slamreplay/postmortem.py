@@ -20,9 +20,12 @@ from slamreplay.consistency.context import CheckContext
 from slamreplay.consistency.evidence.references import references_of, unused_references
 from slamreplay.consistency.evidence.sensed import sensed_references
 from slamreplay.estimators import ESTIMATORS, RECORDED
+from slamreplay.estimators.pose_graph.estimator import PoseGraph
+from slamreplay.estimators.pose_graph.product import MapAndGraph, map_and_graph
 from slamreplay.estimators.recorded import recorded_names
 from slamreplay.hindsight.pipeline import hindsight
 from slamreplay.replay.metrics import trial_metrics
+from slamreplay.replay.parameters import configured
 from slamreplay.report.evidence import Postmortem, TrialResult
 from slamreplay.report.metrics import asked_of, run_metrics
 from slamreplay.verdict.judge import judge
@@ -104,8 +107,10 @@ def postmortem(
         for run, asked in zip(runs, of_runs, strict=True)
         if run.trial.estimator not in RECORDED
     ]
+    slam = _slam(bundle, runs)
     say("done", 1.0)
     return Postmortem(
+        slam=slam,
         manifest=bundle.manifest,
         grid=view.grid,
         belief=belief,
@@ -135,6 +140,19 @@ def _recorded(view: BundleView) -> tuple[Run, ...]:
         trial = Trial(view.manifest.bundle_id, name, 0)
         runs.append(Run(trial, replace(estimate, innovations=told)))
     return tuple(runs)
+
+
+def _slam(bundle: Bundle, runs: Sequence[Run]) -> MapAndGraph | None:
+    """The map and the graph behind the first undisturbed run of the pose graph, made again.
+
+    A run keeps poses and ledger only: the points of all scans would make it ten times as large.
+    """
+    for run in runs:
+        trial = run.trial
+        if trial.estimator == PoseGraph.name and not trial.perturbation and run.estimate:
+            estimator = configured(trial.estimator, trial.parameters)
+            return map_and_graph(bundle.view(), estimator.config)
+    return None
 
 
 def _worst_first(findings: Sequence[Finding]) -> tuple[Finding, ...]:

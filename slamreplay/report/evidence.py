@@ -18,6 +18,7 @@ from slamreplay.consistency.belief.jumps.found import Jump
 from slamreplay.consistency.belief.summary import ConsistencySummary
 from slamreplay.consistency.evidence.nees import Nees
 from slamreplay.estimators import RECORDED
+from slamreplay.estimators.pose_graph.product import MapAndGraph
 from slamreplay.geometry import se2
 from slamreplay.geometry.times import seconds_since
 from slamreplay.maps.grid import OccupancyGrid
@@ -58,6 +59,7 @@ class Postmortem:
         recorded: the localizer of the log as runs, its ledger with what the log holds near it.
         jumps: of each run, the recorded ones first, the steps of its path and their causes.
         trace_ns: the moment around which is asked what moved the belief, None if nobody asked.
+        slam: the map and the graph that the undisturbed run of `pose_graph` made.
         reliability: how often what was said with a confidence was right, as measured.
     """
 
@@ -78,6 +80,7 @@ class Postmortem:
     recorded: tuple[Run, ...] = ()
     jumps: tuple[tuple[Trial, tuple[Jump, ...]], ...] = ()
     trace_ns: int | None = None
+    slam: MapAndGraph | None = None
     reliability: Reliability = field(default_factory=measured_reliability)
 
     def seconds(self, t_ns: ArrayLike) -> se2.Array:

@@ -17,6 +17,7 @@ from slamreplay.report.figures import canvas
 from slamreplay.report.figures.consistency import consistency_figure
 from slamreplay.report.figures.course import course_figure
 from slamreplay.report.figures.covariance import covariance_figure
+from slamreplay.report.figures.graph import graph_figure
 from slamreplay.report.figures.map import map_figure
 from slamreplay.report.figures.reliability import reliability_figure
 from slamreplay.report.page import Page, page
@@ -59,6 +60,7 @@ def _pictures(post: Postmortem, view: Page) -> dict[str, Picture | None]:
         "course": _picture(post, course_figure, canvas.WIDE, view.course_alt),
         "covariance": _picture(post, covariance_figure, canvas.WIDE, view.covariance_alt),
         "consistency": _picture(post, _consistency, canvas.WIDE, view.consistency_alt),
+        "graph": _picture(post, _graph, canvas.BESIDE, view.graph_alt),
         "reliability": _picture(post, _reliability, canvas.BESIDE, view.reliability_alt),
     }
 
@@ -73,6 +75,10 @@ def _picture(
 
 def _consistency(post: Postmortem, width_in: float) -> Figure | None:
     return consistency_figure(post.consistency, width_in)
+
+
+def _graph(post: Postmortem, width_in: float) -> Figure | None:
+    return None if post.slam is None else graph_figure(post.slam, width_in)
 
 
 def _reliability(post: Postmortem, width_in: float) -> Figure | None:

@@ -48,6 +48,7 @@ class Page:
     actions: Table
     regions: Table
     trials: Table
+    graph_alt: str
     innovations: Table
     jumps: Table
     traces: tuple[tuple[str, Table], ...]
@@ -102,6 +103,7 @@ def page(post: Postmortem) -> Page:
         actions=tables.actions(post),
         regions=tables.regions(post),
         trials=tables.trials(post),
+        graph_alt=phrases.graph_alt(post),
         innovations=innovations(post),
         jumps=trace_tables.jumps(post),
         traces=trace_tables.traces(post),

@@ -106,6 +106,17 @@ def covariance_alt(post: Postmortem) -> str:
     )
 
 
+def graph_alt(post: Postmortem) -> str:
+    """The picture of SLAM's map in words."""
+    if post.slam is None:
+        return ""
+    taken, asked = int(post.slam.accepted.sum()), len(post.slam.closures)
+    return (
+        f"The map that the pose graph made, its {len(post.slam.node_xyyaw)} nodes, and "
+        f"{asked} places that were looked for again, of which {taken} close a loop."
+    )
+
+
 def trials_note(post: Postmortem) -> str:
     """What the trials' errors are measured against."""
     if any(t.metrics.get("reference_rmse_m") is not None for t in post.trials):
