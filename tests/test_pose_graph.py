@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from slamreplay.bundle.run import Trial
 from slamreplay.bundle.track import PoseTrack
 from slamreplay.errors import NotApplicableError, UsageError
 from slamreplay.estimators.pose_graph.candidates import Candidate, relations_of
@@ -23,8 +24,11 @@ from slamreplay.geometry import se2
 from slamreplay.geometry.covariance import composed
 from slamreplay.graph.online import OnlineGraph
 from slamreplay.ingest.pipeline import ingest
+from slamreplay.postmortem import postmortem
+from slamreplay.replay.runner import replay
 from slamreplay.report.figures.canvas import plain_style, svg_bytes
 from slamreplay.report.figures.graph import graph_figure
+from slamreplay.report.html import html
 from slamreplay.testing.edits import without
 from slamreplay.testing.synthetic import START_NS, synthetic_bundle, true_path
 
@@ -293,3 +297,10 @@ def test_a_round_of_100_m_ends_where_it_began(tmp_path):
     ends = track.xyyaw[[0, -1], :2]
     assert np.hypot(*(ends[1] - truth[1])) < 0.05
     assert np.hypot(*((ends[1] - ends[0]) - (truth[1] - truth[0]))) < 0.05
+
+
+def test_the_report_of_its_run_shows_map_and_closures(laps):
+    runs = replay(laps, [Trial(laps.manifest.bundle_id, "pose_graph", 0)])
+    page = html(postmortem(laps, runs))
+    assert "The map that the pose graph made" in page
+    assert "places that were looked for again, of which" in page

@@ -8,6 +8,7 @@ import typer
 from scipy.spatial.transform import Rotation
 from typer.testing import CliRunner
 
+from slamreplay.bundle.run import Trial
 from slamreplay.bundle.track import PoseTrack
 from slamreplay.bundle.view import Bundle
 from slamreplay.cli import perturb
@@ -16,7 +17,10 @@ from slamreplay.geometry import se2, se3
 from slamreplay.ingest.options import IngestOptions
 from slamreplay.ingest.pipeline import ingest
 from slamreplay.ingest.relations_file import read_relations
+from slamreplay.postmortem import postmortem
 from slamreplay.replay.relations import relation_errors, relation_metrics
+from slamreplay.replay.runner import replay
+from slamreplay.report.html import html
 
 STAMPS = np.array([10_000_000_000, 10_200_000_000, 10_100_000_000, 11_000_000_000])
 T_NS = STAMPS + 5
@@ -150,3 +154,15 @@ def test_metric_of_raw_odometry_is_the_published_one(real_logs, name, expected):
     distance, turn = np.hypot(off[:, 0], off[:, 1]), np.degrees(np.abs(off[:, 2]))
     found = (distance.mean(), distance.std(), turn.mean(), turn.std())
     np.testing.assert_allclose(found, expected, rtol=0.002)
+
+
+def test_the_report_shows_them_beside_the_map_that_slam_made(with_relations):
+    bundle = ingest(
+        [with_relations / "a.clf"],
+        with_relations / "b",
+        IngestOptions(reference=with_relations / "a.relations"),
+    )
+    runs = replay(bundle, [Trial(bundle.manifest.bundle_id, "dead_reckoning", 0)])
+    page = html(postmortem(bundle, runs))
+    assert "mean error of relations [m]" in page
+    assert "The map that the pose graph made" not in page

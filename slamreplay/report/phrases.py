@@ -119,7 +119,13 @@ def graph_alt(post: Postmortem) -> str:
 
 def trials_note(post: Postmortem) -> str:
     """What the trials' errors are measured against."""
-    if any(t.metrics.get("reference_rmse_m") is not None for t in post.trials):
+    told = [name for t in post.trials for name, value in t.metrics.items() if value is not None]
+    if "relations_m" in told:
+        return (
+            "Relations are motions between two scans that somebody measured: a trajectory's mean "
+            "error of them needs no frame in common."
+        )
+    if "reference_rmse_m" in told:
         return "Errors are distances to the log's own reference, nothing aligned."
     return "Errors are distances to hindsight, nothing aligned."
 

@@ -26,6 +26,8 @@ _COLUMNS = {
     "baseline_max_m": "from baseline [m]",
     "ate_aligned_m": "rms error, rigidly aligned [m]",
     "nees_mean": "mean NEES [1]",
+    "relations_m": "mean error of relations [m]",
+    "relations_rad": "and [rad]",
 }
 
 
