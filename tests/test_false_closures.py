@@ -38,7 +38,7 @@ def test_by_the_score_alone_false_closures_bend_the_way_and_the_kernel_undoes_th
     bare, held = closed(*repetitive, 0.65, is_checked=False)
 
     assert bare.false > 0
-    assert bare.best_false > 0.8  # they look as good as true ones
+    assert bare.best_false > 0.7  # they look as good as many a true one
     assert np.hypot(*(bare.false_to - bare.false_from).T).min() > 0.5
     assert held.left_on == 0
     assert held.largest_m < 0.3 * bare.largest_m
