@@ -97,3 +97,18 @@ def test_a_foreign_folder_and_a_missing_log_are_refused(bundle, tmp_path):
     assert isinstance(call(bundle, "-o", tmp_path / "mine").exception, OutputError)
     assert isinstance(call(tmp_path / "no.bag", "-o", tmp_path / "R").exception, SlamreplayError)
     assert [p.name for p in (tmp_path / "mine").iterdir()] == ["thesis.tex"]
+
+
+def test_why_an_estimator_did_not_run_widens_no_column(tmp_path, monkeypatch):
+    """A log without a reference has a single column of numbers."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    made = synthetic_bundle(seconds=3.0, with_map=False)
+    tables = {name: made.table(name) for name in TABLES if name != "references"}
+    write_bundle(tmp_path / "b", made.manifest, tables, {})
+    ran = call(tmp_path / "b", "-o", tmp_path / "R", "-e", "dead_reckoning", "-e", "amcl")
+
+    head, drift, amcl = ran.stdout.splitlines()
+    assert head.split() == ["estimator", "perturbation", "level", "poses"]
+    assert drift.split() == ["dead_reckoning", "(baseline)", "30"]
+    assert len(drift) < 60
+    assert "not applicable: amcl: needs a map" in amcl

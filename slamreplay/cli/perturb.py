@@ -190,24 +190,23 @@ def _text(rows: list[dict[str, Any]]) -> str:
     for group, key in _GROUPS:
         columns += group if any(row["metrics"][key] for row in rows) else ()
     lines = [["estimator", "perturbation", "level", *(title for title, _ in columns)]]
+    reasons = [""]
     for row in sorted(rows, key=lambda row: order.index(str(row["estimator"]))):
         level = "" if row["level"] is None else f"{row['level']:g} {row['unit']}"
         line = [str(row["estimator"]), str(row["perturbation"] or "(baseline)"), level]
-        if row["not_applicable"]:
-            line.append(f"not applicable: {row['not_applicable']}")
-        else:
-            line += [_number(row["metrics"], key) for _, key in columns]
+        reason = row["not_applicable"]
+        line += [] if reason else [_number(row["metrics"], key) for _, key in columns]
         lines.append(line)
-    full = [line for line in lines if len(line) == len(lines[0])]
-    widths = [max(len(line[k]) for line in full) for k in range(len(lines[0]))]
-    widths[:3] = [max(len(line[k]) for line in lines) for k in range(3)]
+        reasons.append(f"not applicable: {reason}" if reason else "")
+    widths = [max(len(line[k]) for line in lines if k < len(line)) for k in range(len(lines[0]))]
     return "\n".join(
         "  ".join(
-            cell.ljust(width) if k < 3 or len(line) < len(widths) else cell.rjust(width)
-            for k, (cell, width) in enumerate(zip(line, widths, strict=False))
+            [*(cell.ljust(width) for cell, width in zip(line[:3], widths[:3], strict=True)),
+             *(cell.rjust(width) for cell, width in zip(line[3:], widths[3:], strict=False)),
+             reason]
         ).rstrip()
-        for line in lines
-    )
+        for line, reason in zip(lines, reasons, strict=True)
+    )  # fmt: skip
 
 
 def _number(metrics: Metrics, key: str) -> str:
