@@ -28,8 +28,6 @@ from slamreplay.geometry import se2
 
 SETTINGS = frozenset({OFFSET, ROTATE, GLOBAL, MIN_SCORE, PROCESS_NOISE, MEASUREMENT_NOISE})
 #: Why the conformance kit cannot make a world that has its noise.
-WITHOUT_NOISE = "what a match weighs is measured on the log, not told"
-NEEDS = frozenset({"scans"})
 WITHOUT_NOISE = (
     "it learns from the log what scans miss, and allows for errors that neighbouring beams have in "
     "common, which no drawn world has"
@@ -51,7 +49,7 @@ class PoseGraph:
 
     name: ClassVar[str] = "pose_graph"
     causal: ClassVar[bool] = False
-    needs: ClassVar[frozenset[str]] = NEEDS
+    needs: ClassVar[frozenset[str]] = frozenset({"scans"})
     settings: ClassVar[frozenset[str]] = SETTINGS
     without_noise: ClassVar[str] = WITHOUT_NOISE
 
@@ -88,28 +86,11 @@ class PoseGraph:
 
 
 @dataclass(frozen=True)
-class PoseGraphOnline:
-    """The same closures, each taken in when it was found (iSAM2): nothing later is known.
-
-    Attributes:
-        config: hyper-parameters.
-    """
-
-    config: GraphConfig = field(default_factory=GraphConfig)
+class PoseGraphOnline(PoseGraph):
+    """The same closures, each taken in when it was found (iSAM2): nothing later is known."""
 
     name: ClassVar[str] = "pose_graph_online"
-    needs: ClassVar[frozenset[str]] = NEEDS
-    settings: ClassVar[frozenset[str]] = SETTINGS
-    without_noise: ClassVar[str] = WITHOUT_NOISE
-
-    @classmethod
-    def from_parameters(cls, given: Mapping[str, object]) -> Self:
-        """The estimator with some hyper-parameters set.
-
-        Raises:
-            UsageError: one that there is not, or a value that it cannot take.
-        """
-        return cls(settings_from(GraphConfig, given, where=cls.name))
+    causal: ClassVar[bool] = True
 
     def run(self, view: BundleView, *, seed: int) -> Estimate:  # noqa: ARG002 - nothing is random
         """As of `PoseGraph`; NaN before the start, too.
