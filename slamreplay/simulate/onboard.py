@@ -9,8 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from slamreplay.errors import MapError
-from slamreplay.estimators.amcl import kernels
+from slamreplay.estimators.amcl import first_cloud, kernels
 from slamreplay.estimators.amcl.cloud import (
     LEAST_RESULTANT,
     SHARE,
@@ -108,10 +107,7 @@ class OnboardFilter:
             mean_xyyaw: (3,) pose in the map frame.
             cov: (3, 3) of x y yaw; a diagonal of zeros puts all particles on the mean.
         """
-        values, vectors = np.linalg.eigh(np.asarray(cov, dtype=np.float64))
-        scale = vectors * np.sqrt(np.maximum(values, 0.0))
-        noise = self._rng.standard_normal((self._config.max_particles, 3))
-        self._restart(np.asarray(mean_xyyaw, dtype=np.float64) + noise @ scale.T)
+        self._restart(first_cloud.about(self._rng, mean_xyyaw, cov, self._config.max_particles))
 
     def initialise_globally(self) -> None:
         """Spread `max_particles` evenly over the map's free cells and all headings.
@@ -119,7 +115,7 @@ class OnboardFilter:
         Raises:
             MapError: no cell of the map is free.
         """
-        self._restart(self._anywhere(self._config.max_particles))
+        self._restart(first_cloud.anywhere(self._rng, self._grid, self._config.max_particles))
 
     def is_due(self, odometry_xyyaw: ArrayLike) -> bool:
         """Whether a scan taken at this odometry (3,) would update the filter."""
@@ -221,7 +217,9 @@ class OnboardFilter:
         lost = max(0.0, 1.0 - self._fast / self._slow)
         if lost > 0.0:  # augmented MCL: the likelihood fell, so part of the set starts anywhere
             fresh = np.full(c.max_particles, lost / c.max_particles)
-            particles = np.vstack([particles, self._anywhere(c.max_particles)])
+            particles = np.vstack(
+                [particles, first_cloud.anywhere(self._rng, self._grid, c.max_particles)]
+            )
             weights = np.concatenate([weights * (1.0 - lost), fresh])
             self._slow = self._fast = 0.0
         start_size, start_draw = self._rng.random(2)
@@ -239,14 +237,6 @@ class OnboardFilter:
         )
         rows = kernels.systematic(cumulative, start_draw, n)
         self._adopt(particles[rows], np.full(n, 1.0 / n))
-
-    def _anywhere(self, n: int) -> se2.Array:
-        free = np.argwhere(self._grid.free)
-        if not len(free):
-            raise MapError("the map has no free cell to start in")
-        cell = free[self._rng.integers(0, len(free), n)]
-        xy = self._grid.centre_of(cell + self._rng.random((n, 2)) - 0.5)
-        return np.column_stack([xy, self._rng.random(n) * 2.0 * np.pi - np.pi])
 
     def _restart(self, particles: se2.Array) -> None:
         particles[:, 2] = se2.wrap_angle(particles[:, 2])
