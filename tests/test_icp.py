@@ -12,7 +12,8 @@ from slamreplay.errors import NotApplicableError
 from slamreplay.geometry import se2
 from slamreplay.maps.grid import OccupancyGrid
 from slamreplay.maps.raycast import cast_rays
-from slamreplay.matching.icp import IcpSettings, _axes, _nearest, _sum_up, icp
+from slamreplay.matching.icp import IcpSettings, icp
+from slamreplay.matching.icp_kernels import axes, nearest, sum_up
 from slamreplay.matching.line_target import line_target
 from slamreplay.matching.open3d_icp import icp_open3d
 from slamreplay.testing.synthetic import room_grid
@@ -178,7 +179,7 @@ def test_the_nearest_point_is_the_nearest(seed, reach):
     frame = (target.cell_m, target.corner_xy[0], target.corner_xy[1])
     for x, y in rng.uniform(-1.5, 1.5, (30, 2)):
         before = int(rng.integers(-1, len(target.points)))
-        found = _nearest(target.points, target.index, frame, x, y, reach, before)
+        found = nearest(target.points, target.index, frame, x, y, reach, before)
         if not len(target.points):
             assert found == -1
             continue
@@ -192,7 +193,7 @@ def test_axes_are_eigenvectors():
         root = rng.normal(size=(3, 3))
         out = np.zeros((4, 3, 3))
         out[0] = root @ root.T
-        _axes(out, np.zeros((3, 3)), 1e-3)
+        axes(out, np.zeros((3, 3)), 1e-3)
 
         values, vectors = np.linalg.eigh(out[0])
         np.testing.assert_allclose(out[3, 1], values, atol=1e-12)
@@ -216,7 +217,7 @@ def test_the_sums_are_compiled_once():
     icp(line_target(points), points, np.zeros(3))
 
     # None where the whole came from the cache.
-    assert len(_sum_up.signatures) <= 1
+    assert len(sum_up.signatures) <= 1
 
 
 def test_open3d_finds_the_same_place():

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from slamreplay.matching.field import ScoreField
 
-# These are compiled into the kernels of branch_and_bound: numba does not see that they change.
+# These are compiled into bound_kernels: numba does not see that they change.
 #: Squares have edges of 2, 4, 8, 16 and 32 cells; level 0 is the field itself.
 LEVELS = 5
 #: The longest run of headings that is bounded at once.
