@@ -41,8 +41,13 @@ WORLDS = {
 }
 
 PERTURBATION_LINES = (
+    "gyro_bias",
+    "imu_drop",
     "initial_pose",
+    "odometry_drop",
+    "odometry_noise",
     "odometry_scale",
+    "odometry_slip",
     "scan_delay",
     "scan_drop",
     "tf_delay",
@@ -697,7 +702,9 @@ def test_estimators_covariance_follows_its_noise(name):
 
 @pytest.mark.parametrize("name", PERTURBATION_LINES)
 def test_perturbation(name):
-    check_perturbation(PERTURBATIONS.load(name)())
+    check_perturbation(
+        PERTURBATIONS.load(name)(), bundle=synthetic_bundle(seconds=8.0, with_imu=True)
+    )
 
 
 @pytest.mark.parametrize("name", DECODER_LINES)

@@ -7,8 +7,13 @@ _HERE = "slamreplay.perturb"
 PERTURBATIONS = Registry(
     "perturbation",
     {
+        "gyro_bias": f"{_HERE}.gyro_bias:GyroBias",
+        "imu_drop": f"{_HERE}.imu_drop:ImuDrop",
         "initial_pose": f"{_HERE}.initial_pose:InitialPose",
+        "odometry_drop": f"{_HERE}.odometry_drop:OdometryDrop",
+        "odometry_noise": f"{_HERE}.odometry_noise:OdometryNoise",
         "odometry_scale": f"{_HERE}.odometry_scale:OdometryScale",
+        "odometry_slip": f"{_HERE}.odometry_slip:OdometrySlip",
         "scan_delay": f"{_HERE}.scan_delay:ScanDelay",
         "scan_drop": f"{_HERE}.scan_drop:ScanDrop",
         "tf_delay": f"{_HERE}.tf_delay:TfDelay",
