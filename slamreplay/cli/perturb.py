@@ -103,7 +103,9 @@ def perturb(
     """
     if recipe is not None:
         from slamreplay.cli.lab import run_lab
+        from slamreplay.recipes import LabRecipe, read_recipe
 
+        asked = read_recipe(recipe)
         only_logs = {
             "LOG": logs,
             "--perturbation": perturbations,
@@ -117,8 +119,10 @@ def perturb(
             "--end": end_s,
         }
         foreign = [name for name, value in only_logs.items() if value not in (None, [])]
-        run_lab(recipe, output, seed=seed, given=foreign, as_json=as_json)
-        return
+        if isinstance(asked, LabRecipe):
+            run_lab(asked, recipe, output, seed=seed, given=foreign, as_json=as_json)
+            return
+        raise UsageError("designs are not run yet", where=recipe)
     if not logs:
         raise UsageError("there is no LOG to replay", hint="name one, or a lab with --recipe")
     from slamreplay.bundle.atomic import check_target
