@@ -7,10 +7,18 @@ _HERE = "slamreplay.perturb"
 PERTURBATIONS = Registry(
     "perturbation",
     {
+        "beam_drop": f"{_HERE}.beam_drop:BeamDrop",
+        "clock_skew": f"{_HERE}.clock_skew:ClockSkew",
         "initial_pose": f"{_HERE}.initial_pose:InitialPose",
+        "laser_extrinsic": f"{_HERE}.laser_extrinsic:LaserExtrinsic",
+        "max_range": f"{_HERE}.max_range:MaxRange",
         "odometry_scale": f"{_HERE}.odometry_scale:OdometryScale",
+        "people": f"{_HERE}.people:People",
+        "range_bias": f"{_HERE}.range_bias:RangeBias",
+        "range_noise": f"{_HERE}.range_noise:RangeNoise",
         "scan_delay": f"{_HERE}.scan_delay:ScanDelay",
         "scan_drop": f"{_HERE}.scan_drop:ScanDrop",
+        "stamp_jitter": f"{_HERE}.stamp_jitter:StampJitter",
         "tf_delay": f"{_HERE}.tf_delay:TfDelay",
     },
 )
