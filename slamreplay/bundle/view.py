@@ -13,7 +13,7 @@ import pyarrow.compute as pc
 
 from slamreplay.bundle.arrow import numbers_from_arrow
 from slamreplay.bundle.manifest import Manifest
-from slamreplay.bundle.map_course import Held, MapStretch, map_course, map_stretches
+from slamreplay.bundle.map_course import Held, MapStretch, map_course, map_stretches, renamed
 from slamreplay.bundle.placeholders import without_placeholders
 from slamreplay.bundle.role_tables import ROLE_TABLES
 from slamreplay.bundle.schema import JUDGING_KINDS, RELATIONS, SENSED_KINDS, TABLES
@@ -149,7 +149,8 @@ class BundleView:
     Attributes:
         bundle: what lies beneath.
         tables: tables a perturbation has exchanged.
-        replaced_grid: a map a perturbation has exchanged.
+        replaced_grid: a map that holds all along, in place of those of the bundle.
+        redrawn: maps that stand for versions of the bundle, by these versions.
         settings: estimator settings a perturbation has changed, by name.
         held_out: kinds of references that are left out beside those that only judge.
         stretch: the part of the log that is looked at; None is all of it.
@@ -158,6 +159,7 @@ class BundleView:
     bundle: Bundle
     tables: Mapping[str, Table] = field(default_factory=lambda: MappingProxyType({}))
     replaced_grid: OccupancyGrid | None = None
+    redrawn: Mapping[str, OccupancyGrid] = field(default_factory=lambda: MappingProxyType({}))
     settings: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
     held_out: frozenset[str] = frozenset()
     stretch: MapStretch | None = None
@@ -206,17 +208,20 @@ class BundleView:
     @cached_property
     def map_course(self) -> tuple[Held, ...]:
         """The map versions that held, from the first to the last moment of the span."""
-        if self.stretch is not None:
-            return self.stretch.held
         if self.replaced_grid is not None:
             return (Held(self.replaced_grid.version, *self.span),)
-        return map_course(self.table("map_updates"), self.bundle.map_versions, *self.span)
+        if self.stretch is not None:
+            return self.stretch.held
+        held = map_course(self.table("map_updates"), self.bundle.map_versions, *self.span)
+        return renamed(held, {h.version: self._stands_for(h.version) for h in held})
 
     @cached_property
     def map_stretches(self) -> tuple[MapStretch, ...]:
         """The parts of the log over which the maps were of one place; none without a map."""
         if self.stretch is not None:
-            return (self.stretch,)
+            return (MapStretch(self.map_course),)
+        if self.redrawn:
+            return map_stretches(self.map_course, self.grid_of)
         return self.bundle.map_stretches(self.map_course)
 
     @cached_property
@@ -227,8 +232,9 @@ class BundleView:
 
     def grid_of(self, version: str) -> OccupancyGrid | None:
         """A map by its version, None where it is not there."""
-        if self.replaced_grid is not None and self.replaced_grid.version == version:
-            return self.replaced_grid
+        for grid in (self.replaced_grid, *self.redrawn.values()):
+            if grid is not None and grid.version == version:
+                return grid
         return self.bundle.grid(version)
 
     def within(self, stretch: MapStretch) -> BundleView:
@@ -242,6 +248,10 @@ class BundleView:
             tables[name] = self.table(name).take(own)
         return replace(self, tables={**self.tables, **tables}, stretch=stretch)
 
+    def _stands_for(self, recorded: str) -> str:
+        """The version that holds whenever a version of the bundle did."""
+        return self.redrawn[recorded].version if recorded in self.redrawn else recorded
+
     @cached_property
     def transforms(self) -> TransformBuffer:
         """The tf tree of this view."""
@@ -252,8 +262,20 @@ class BundleView:
         return replace(self, tables={**self.tables, table.schema.name: table})
 
     def with_grid(self, grid: OccupancyGrid) -> BundleView:
-        """A view with the map exchanged."""
+        """A view in which one map holds all along."""
         return replace(self, replaced_grid=grid)
+
+    def with_grids(self, grids: Mapping[str, OccupancyGrid]) -> BundleView:
+        """A view with other maps in place of some that hold at some time, by their versions."""
+        if self.replaced_grid is not None:
+            return self.with_grid(grids.get(self.replaced_grid.version, self.replaced_grid))
+        redrawn = dict(self.redrawn)
+        for recorded in self.bundle.map_versions:
+            if self._stands_for(recorded) in grids:
+                redrawn[recorded] = grids[self._stands_for(recorded)]
+        new = {version: grid.version for version, grid in grids.items()}
+        stretch = None if self.stretch is None else MapStretch(renamed(self.stretch.held, new))
+        return replace(self, redrawn=redrawn, stretch=stretch)
 
     def with_setting(self, name: str, value: float) -> BundleView:
         """A view that asks estimators to run with one setting changed."""
