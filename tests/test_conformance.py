@@ -41,7 +41,9 @@ WORLDS = {
 }
 
 PERTURBATION_LINES = (
+    "frame_swap",
     "gyro_bias",
+    "handedness",
     "imu_drop",
     "initial_pose",
     "measurement_noise_scale",
@@ -53,9 +55,11 @@ PERTURBATION_LINES = (
     "particle_count",
     "pose_covariance_scale",
     "process_noise_scale",
+    "quaternion_order",
     "scan_delay",
     "scan_drop",
     "tf_delay",
+    "unit_error",
 )
 
 STAMP = {"sec": 3, "nanosec": 4}
