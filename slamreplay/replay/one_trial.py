@@ -11,6 +11,7 @@ from slamreplay.bundle.view import Bundle, BundleView
 from slamreplay.errors import NotApplicableError
 from slamreplay.perturb import PERTURBATIONS
 from slamreplay.replay.parameters import configured
+from slamreplay.replay.reported import REPORTED, as_reported
 
 #: Random numbers of the perturbation do not depend on how many the estimator draws.
 _PERTURBATION_STREAM = 1
@@ -28,19 +29,21 @@ def run_trial(bundle: Bundle, trial: Trial) -> Run:
             rng = np.random.Generator(np.random.PCG64(stream))
             view = PERTURBATIONS.load(name)().apply(view, variant, trial.level, rng)
         _refuse_ignored(view, estimator)
-        return Run(trial, estimator.run(view, seed=trial.seed))
+        return Run(trial, as_reported(estimator.run(view, seed=trial.seed), view.settings))
     except NotApplicableError as reason:
         return Run(trial, None, str(reason))
 
 
 def _refuse_recorded(trial: Trial, estimator: Any) -> None:
     """What was recorded stays as it was, whatever is done to the evidence."""
-    if trial.perturbation is not None and not getattr(estimator, "reruns", True):
+    if trial.perturbation is None or getattr(estimator, "reruns", True):
+        return
+    if not PERTURBATIONS.load(trial.perturbation.partition(".")[0]).touches <= REPORTED:
         raise NotApplicableError("recorded, cannot be run again")
 
 
 def _refuse_ignored(view: BundleView, estimator: Any) -> None:
     """A setting that is not honoured would pass the baseline off as a trial."""
-    ignored = sorted(set(view.settings) - estimator.settings)
+    ignored = sorted(set(view.settings) - estimator.settings - REPORTED)
     if ignored:
         raise NotApplicableError(f"has no setting {', '.join(ignored)}", where=estimator.name)

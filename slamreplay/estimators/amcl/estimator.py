@@ -20,11 +20,11 @@ from slamreplay.estimators.amcl.match import ScanMatcher
 from slamreplay.estimators.amcl.parameters import LIVE, NAMES, config_from
 from slamreplay.estimators.amcl.scan_quantile import ScanQuantile
 from slamreplay.estimators.inputs import need_grid, need_odometry, need_scans
-from slamreplay.estimators.start import DEFAULT_COV, GLOBAL, OFFSET, ROTATE, Start, starts
+from slamreplay.estimators.scales import MEASUREMENT_NOISE, PARTICLES, PROCESS_NOISE, scales_of
+from slamreplay.estimators.start import DEFAULT_COV, GLOBAL, MOVED, Start, starts
 
-#: Settings a perturbation may change: a ratio of both particle numbers, and a number that makes
-#: every random one another.
-PARTICLES, RANDOM_SEED = "particle_count", "random_seed"
+#: A setting that a perturbation may change: a number that makes every random one another.
+RANDOM_SEED = "random_seed"
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,13 @@ class Amcl:
     live_parameters: ClassVar[tuple[str, ...]] = LIVE
     name: ClassVar[str] = "amcl"
     needs: ClassVar[frozenset[str]] = frozenset({"odometry", "scans", "map"})
-    settings: ClassVar[frozenset[str]] = frozenset({OFFSET, ROTATE, GLOBAL, PARTICLES, RANDOM_SEED})
+    settings: ClassVar[frozenset[str]] = MOVED | {
+        GLOBAL,
+        PARTICLES,
+        RANDOM_SEED,
+        PROCESS_NOISE,
+        MEASUREMENT_NOISE,
+    }
     without_noise: ClassVar[str] = (
         "a likelihood field is no model of ranges, so that no world has the noise it takes"
     )
@@ -125,7 +131,7 @@ class Amcl:
 
     def _perturbed(self, view: BundleView, seed: int) -> tuple[AmclConfig, tuple[int, ...]]:
         """The configuration and the words of the seed, as a perturbation changes them."""
-        c, ratio = self.config, view.settings.get(PARTICLES, 1.0)
+        c, ratio = self.config.scaled(*scales_of(view)), view.settings.get(PARTICLES, 1.0)
         if ratio != 1.0:
             least, most = (max(1, round(ratio * n)) for n in (c.min_particles, c.max_particles))
             c = replace(c, min_particles=least, max_particles=most)
