@@ -63,6 +63,11 @@ class Axis:
             widest, rounds = widest / 2.0, rounds + 1
         return rounds
 
+    @property
+    def most_levels(self) -> int:
+        """Levels that one seed may come to."""
+        return len(self.levels) + self.most_halvings
+
 
 @dataclass(frozen=True)
 class Dose:
@@ -97,7 +102,7 @@ class Plan:
     @property
     def most_trials(self) -> int:
         """Trials at most: baselines, doses and controls."""
-        doses = sum(len(axis.levels) + axis.most_halvings for axis in self.axes)
+        doses = sum(axis.most_levels for axis in self.axes)
         each = (1 + doses) * len(self.seeds) + len(self.axes) + 1
         return len(self.estimators) * each
 
