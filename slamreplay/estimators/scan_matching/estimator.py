@@ -18,7 +18,7 @@ from slamreplay.estimators.parameters import settings_from
 from slamreplay.estimators.scan_matching.config import MatchConfig
 from slamreplay.estimators.scan_matching.drift import drifted, in_frame
 from slamreplay.estimators.scan_matching.ledger import match_innovations
-from slamreplay.estimators.scan_matching.local import local_trajectory
+from slamreplay.estimators.scan_matching.local import local_trajectory_of
 from slamreplay.estimators.scan_matching.trajectory import LocalTrajectory
 from slamreplay.estimators.start import OFFSET, ROTATE, Start, starts
 from slamreplay.geometry import se2
@@ -79,7 +79,7 @@ class ScanMatching:
         config = self.config.scaled(
             view.settings.get(PROCESS_NOISE, 1.0), view.settings.get(MEASUREMENT_NOISE, 1.0)
         )
-        local = local_trajectory(scans, odometry, config)
+        local = local_trajectory_of(view, config)
         if not len(local.nodes):
             raise NotApplicableError("no scan has enough points to be matched", where=self.name)
         frame, T_frame_local, start = _placed(view, local, odometry)
