@@ -104,7 +104,45 @@ def scan_sets(view: BundleView) -> tuple[ScanSet, ...]:
     return tuple(found)
 
 
+@dataclass(frozen=True, eq=False)
+class _Returns:
+    """What depends on the scans alone, not on where the laser is; attributes as of `ScanSet`."""
+
+    frame_id: str
+    t_ns: NDArray[np.int64]
+    ranges_m: NDArray[np.float32]
+    angle_min: se2.Array
+    angle_increment: se2.Array
+    time_increment_s: se2.Array
+    hits: NDArray[np.bool_]
+    misses: NDArray[np.bool_]
+    range_max_m: se2.Array
+
+
 def _scans_of(view: BundleView, role: str, odometry: PoseTrack | None) -> ScanSet | None:
+    def decoded(alone: BundleView) -> _Returns | None:
+        return _returns(alone, role)
+
+    found = view.shared("scans", ["scans"], decoded, by=role)
+    if found is None:
+        return None
+    mount, upside_down = laser_mount(view, found.frame_id)
+    sign = -1.0 if upside_down else 1.0
+    return ScanSet(
+        found.t_ns,
+        found.ranges_m,
+        sign * found.angle_min,
+        sign * found.angle_increment,
+        found.time_increment_s,
+        found.hits,
+        found.misses,
+        found.range_max_m,
+        mount,
+        odometry,
+    )
+
+
+def _returns(view: BundleView, role: str) -> _Returns | None:
     table = view.role(role)
     if table is None or not len(table):
         return None
@@ -116,19 +154,16 @@ def _scans_of(view: BundleView, role: str, odometry: PoseTrack | None) -> ScanSe
     matrix[np.repeat(np.arange(n), ranges.lengths), column] = ranges.values
     low, high = table["range_min_m"][:, None], table["range_max_m"][:, None]
     hits, misses = hits_and_misses(matrix, low, high)
-    mount, upside_down = laser_mount(view, str(table["frame_id"][0]))
-    sign = -1.0 if upside_down else 1.0
-    return ScanSet(
+    return _Returns(
+        str(table["frame_id"][0]),
         table.t_ns,
         matrix,
-        sign * table["angle_min_rad"],
-        sign * table["angle_increment_rad"],
+        table["angle_min_rad"],
+        table["angle_increment_rad"],
         table["time_increment_s"],
         hits,
         misses,
         table["range_max_m"],
-        mount,
-        odometry,
     )
 
 

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Hashable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
+from typing import TypeVar
 
 import numpy as np
 import pyarrow.compute as pc
@@ -17,12 +18,15 @@ from slamreplay.bundle.map_course import Held, MapStretch, map_course, map_stret
 from slamreplay.bundle.placeholders import without_placeholders
 from slamreplay.bundle.role_tables import ROLE_TABLES
 from slamreplay.bundle.schema import JUDGING_KINDS, RELATIONS, SENSED_KINDS, TABLES
+from slamreplay.bundle.sharing import Shared
 from slamreplay.bundle.store import read_columns, read_grid, read_manifest, read_table
 from slamreplay.bundle.tables import Table
 from slamreplay.errors import UsageError
 from slamreplay.geometry.times import Times
 from slamreplay.geometry.transforms import Edge, TransformBuffer
 from slamreplay.maps.grid import OccupancyGrid
+
+T = TypeVar("T")
 
 
 def check_held_out(kinds: Collection[str]) -> None:
@@ -45,6 +49,9 @@ class Bundle:
         tables: tables in memory, by name; those on disk are read on demand.
         grids: maps in memory, by version.
         path: the folder on disk, None for a bundle that lives in memory only (tests, notebooks).
+
+    Attributes:
+        shared: what was worked out of its tables, for all views that have them as recorded.
     """
 
     def __init__(
@@ -60,6 +67,7 @@ class Bundle:
         self._evidence: dict[str, Table] = {}
         self._grids = dict(grids)
         self._stretches: dict[tuple[Held, ...], tuple[MapStretch, ...]] = {}
+        self.shared = Shared()
 
     @classmethod
     def open(cls, path: Path) -> Bundle:
@@ -154,6 +162,7 @@ class BundleView:
         settings: estimator settings a perturbation has changed, by name.
         held_out: kinds of references that are left out beside those that only judge.
         stretch: the part of the log that is looked at; None is all of it.
+        only: the tables that may be read, for work that is to depend on no other; None is all.
     """
 
     bundle: Bundle
@@ -163,6 +172,8 @@ class BundleView:
     settings: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
     held_out: frozenset[str] = frozenset()
     stretch: MapStretch | None = None
+    only: frozenset[str] | None = None
+    _own: Shared = field(default_factory=Shared, repr=False)
 
     @property
     def manifest(self) -> Manifest:
@@ -171,6 +182,7 @@ class BundleView:
 
     def table(self, name: str) -> Table:
         """A table by name; of references only those the robot itself sensed."""
+        self._check_may_read(name)
         if name in self.tables:
             return self.tables[name]
         if name in ("references", RELATIONS):
@@ -179,6 +191,7 @@ class BundleView:
 
     def recorded(self, name: str) -> Table:
         """A table by name with its placeholders, for whoever asks what they are."""
+        self._check_may_read(name)
         if name in self.tables:
             return self.tables[name]
         if name == RELATIONS:
@@ -189,6 +202,39 @@ class BundleView:
                 ~np.isin(table["kind"].astype(str), sorted(JUDGING_KINDS | self.held_out))
             )
         return table
+
+    def _check_may_read(self, name: str) -> None:
+        if self.only is not None and name not in self.only:
+            raise AssertionError(f"what is made of {sorted(self.only)} alone reads {name}")
+
+    def shared(
+        self,
+        kind: str,
+        tables: Collection[str],
+        make: Callable[[BundleView], T],
+        *,
+        by: Hashable = (),
+    ) -> T:
+        """What `make` works out of some tables, once for all views that have these as recorded.
+
+        It is given a view with those tables alone, without a map of its own and without settings,
+        so that what it gives is the same bits whoever asked first. Nobody may change it.
+
+        Args:
+            kind: of the result.
+            tables: names of all that is read; not references, of which views differ in silence.
+            make: does the work.
+            by: what the result depends on beside the tables.
+        """
+        if {"references", RELATIONS} & set(tables):
+            raise AssertionError("references are not shared between views")
+        names = sorted(tables)
+        found = [self.table(name) for name in names]
+        place = self._own if any(name in self.tables for name in names) else self.bundle.shared
+        alone = replace(
+            self, only=frozenset(names), replaced_grid=None, settings=MappingProxyType({})
+        )
+        return place.of(kind, by, found, lambda: make(alone))
 
     def role(self, role: str) -> Table | None:
         """The rows of the topic that plays `role` in its table, or None where none does."""
@@ -255,7 +301,11 @@ class BundleView:
     @cached_property
     def transforms(self) -> TransformBuffer:
         """The tf tree of this view."""
-        return TransformBuffer(edges_of(self.table("transforms")))
+        return self.shared(
+            "tf tree",
+            ["transforms"],
+            lambda view: TransformBuffer(edges_of(view.table("transforms"))),
+        )
 
     def with_table(self, table: Table) -> BundleView:
         """A view with one table exchanged."""

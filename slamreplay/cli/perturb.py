@@ -183,7 +183,7 @@ def perturb(
         start_s=start_s,
         end_s=end_s,
     )
-    with options.evidence(logs, how) as bundle:
+    with options.evidence(logs, how, cache=cache_folder() / "bundles") as bundle:
         names = estimators or usual_estimators(bundle)
         trials = design(bundle, names, perturbations or (), seed or 0, given.of)
         with progress_bar("replaying") as progress:

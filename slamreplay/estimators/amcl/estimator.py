@@ -8,6 +8,7 @@ from itertools import pairwise
 from typing import ClassVar, Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from slamreplay.bundle.run import Estimate
 from slamreplay.bundle.scans import ScanSet
@@ -22,6 +23,8 @@ from slamreplay.estimators.amcl.scan_quantile import ScanQuantile
 from slamreplay.estimators.inputs import need_grid, need_odometry, need_scans
 from slamreplay.estimators.scales import MEASUREMENT_NOISE, PARTICLES, PROCESS_NOISE, scales_of
 from slamreplay.estimators.start import DEFAULT_COV, GLOBAL, MOVED, Start, starts
+from slamreplay.maps.grid import OccupancyGrid
+from slamreplay.maps.likelihood_field import distance_field
 
 #: A setting that a perturbation may change: a number that makes every random one another.
 RANDOM_SEED = "random_seed"
@@ -96,7 +99,7 @@ class Amcl:
         if not given and len(known):
             pose, cov = config.initial_pose if config.know_initial_pose else (None, DEFAULT_COV)
             given = {int(known[0]): Start(int(known[0]), pose, cov)}
-        amcl = AmclFilter(config, grid, seeds)
+        amcl = AmclFilter(config, grid, seeds, _distances(view, grid, config))
         quantile = ScanQuantile(config, grid, amcl.distance_m, seeds)
         matcher = ScanMatcher(config, grid, amcl.distance_m)
         ledger = Ledger(scans.t_ns, T_odom_base, frame_id=view.manifest.frames.map or grid.frame_id)
@@ -138,6 +141,14 @@ class Amcl:
         words = (c.random_seed if c.random_seed >= 0 else seed,)
         other = round(view.settings.get(RANDOM_SEED, 0.0)) % 2**32
         return c, (*words, other) if other else words
+
+
+def _distances(view: BundleView, grid: OccupancyGrid, config: AmclConfig) -> NDArray[np.float32]:
+    """The map's distances to walls, once for all trials whose map has these cells, moved or not."""
+    most = config.laser_likelihood_max_dist
+    return view.bundle.shared.of(
+        "distances", (grid.resolution_m, most), [grid.cells], lambda: distance_field(grid, most)
+    )
 
 
 def _beams(config: AmclConfig, scans: ScanSet, row: int) -> Beams:

@@ -18,7 +18,7 @@ from slamreplay.estimators.pose_graph.doubt import doubted
 from slamreplay.estimators.pose_graph.smoothing import Smoothed, smoothed
 from slamreplay.estimators.pose_graph.submaps import Submaps, chain_covariances, submaps
 from slamreplay.estimators.scales import MIN_SCORE, scales_of
-from slamreplay.estimators.scan_matching.local import LocalTrajectory, local_trajectory
+from slamreplay.estimators.scan_matching.local import LocalTrajectory, local_trajectory_of
 from slamreplay.geometry import se2
 from slamreplay.geometry.covariance import composed
 
@@ -55,9 +55,9 @@ def slam_of(view: BundleView, config: GraphConfig, estimator: str, *, is_online:
     Raises:
         NotApplicableError: no scans, or none with enough points.
     """
-    scans = need_scans(view, estimator)
+    need_scans(view, estimator)
     odometry = odometry_track(view)
-    local = local_trajectory(scans, odometry)
+    local = local_trajectory_of(view)
     if not len(local.nodes):
         raise NotApplicableError("no scan has enough points to be matched", where=estimator)
     local = replace(local, motion_cov=doubted(local, odometry))

@@ -19,7 +19,7 @@ from slamreplay.estimators.scales import MEASUREMENT_NOISE, PROCESS_NOISE, scale
 from slamreplay.estimators.scan_matching.config import MatchConfig
 from slamreplay.estimators.scan_matching.drift import drifted, in_frame
 from slamreplay.estimators.scan_matching.ledger import match_innovations
-from slamreplay.estimators.scan_matching.local import local_trajectory
+from slamreplay.estimators.scan_matching.local import local_trajectory_of
 from slamreplay.estimators.scan_matching.trajectory import LocalTrajectory
 from slamreplay.estimators.start import MOVED, Start, starts
 from slamreplay.geometry import se2
@@ -73,7 +73,7 @@ class ScanMatching:
         scans = need_scans(view, self.name)
         odometry = odometry_track(view)
         config = self.config.scaled(*scales_of(view))
-        local = local_trajectory(scans, odometry, config)
+        local = local_trajectory_of(view, config)
         if not len(local.nodes):
             raise NotApplicableError("no scan has enough points to be matched", where=self.name)
         frame, T_frame_local, start = _placed(view, local, odometry)
