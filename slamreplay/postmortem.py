@@ -29,6 +29,8 @@ from slamreplay.replay.parameters import configured
 from slamreplay.report.evidence import Postmortem, TrialResult
 from slamreplay.report.metrics import asked_of, run_metrics
 from slamreplay.verdict.judge import judge
+from slamreplay.verdict.latency.findings import late_findings
+from slamreplay.verdict.latency.latency import latency, usages
 from slamreplay.verdict.limits import Limits
 
 __all__ = ["Postmortem", "postmortem"]
@@ -80,6 +82,9 @@ def postmortem(
     reference, kind = (None, None) if best is None else (best.track, best.kind)
     findings = [*judgement.findings, *unused_references(bundle, context.updates)]
     findings += sensed_references(bundle, found, hold_out)
+    late = latency(view, streams=context.audit.streams)
+    used = usages(late)
+    findings += late_findings(late, used, limits)
     of_runs = [asked_of(run, references, view) for run in runs]
     # What the localizer said was asked already, as the robot's own belief.
     rerun = [
@@ -128,6 +133,8 @@ def postmortem(
         recorded=recorded,
         jumps=tuple((asked_run.trial, jumps_of(asked)) for asked_run, asked in everybody),
         trace_ns=trace_ns,
+        latency=late,
+        usages=used,
     )
 
 

@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
+from slamreplay.bundle.findings import FINDINGS
 from slamreplay.bundle.manifest import Clock, Role
 from slamreplay.bundle.schema import TABLES
 from slamreplay.bundle.tables import Table
@@ -18,9 +19,11 @@ from slamreplay.testing.synthetic import LATENCY_NS, START_NS, synthetic_bundle,
 from slamreplay.testing.synthetic_rows import table_of
 from slamreplay.verdict.latency.ages import ages, motion_since
 from slamreplay.verdict.latency.consumers import Consumer, moving_times
+from slamreplay.verdict.latency.findings import late_findings
 from slamreplay.verdict.latency.latency import latency, usages
 from slamreplay.verdict.latency.spread import share_above, share_interval, spread
 from slamreplay.verdict.latency.words import Words
+from slamreplay.verdict.limits import Limits
 
 MS = 1_000_000
 
@@ -267,6 +270,75 @@ def test_moving_times_leave_rests_out():
 
     assert len(at) == pytest.approx(150, abs=25)
     assert at.max() < 3.5
+
+
+# --- what is told of it ----------------------------------------------------------------------
+
+
+def told(bundle, **limits):
+    found = latency(bundle.view())
+    return late_findings(found, usages(found), Limits(**limits))
+
+
+def late_odometry(seconds):
+    """Odometry that takes so long to arrive, on tf and on its topic."""
+
+    def edit(table):
+        slow = np.zeros(len(table), dtype=bool)
+        if table.schema.name == "odometry":
+            slow[:] = True
+        elif table.schema.name == "transforms":
+            slow = np.asarray(table["child_frame"] == "base_link")
+        return table.replace(t_log_ns=table["t_log_ns"] + np.where(slow, ns(seconds), 0))
+
+    return edit
+
+
+def test_an_age_over_the_budget_alone_is_no_finding():
+    bundle = driven(command=commands(hz=50.0), plan=plans())
+
+    assert usages(latency(bundle.view()))[0].over[0] > 0.5
+    assert told(bundle) == ()
+
+
+@pytest.mark.parametrize(
+    ("late_s", "plan", "severity"),
+    [(0.7, plans(seconds=20.0), "info"), (1.3, plans(seconds=20.0), "warning"),
+     (1.3, None, "info")],
+)  # fmt: skip
+def test_poses_that_were_old_while_the_robot_moved(late_s, plan, severity):
+    bundle = driven(command=commands(hz=50.0, seconds=20.0), plan=plan, seconds=20.0,
+                    edit=late_odometry(late_s))  # fmt: skip
+    (finding,) = [f for f in told(bundle) if "the controller" in f.message]
+
+    assert (finding.id, finding.severity) == ("SR-LAT-001", severity)
+    assert finding.value == pytest.approx(late_s + 0.05, abs=0.02)
+    assert (finding.high, finding.unit) == (0.02, "s")
+    assert "which the pose did not say" in finding.message
+
+
+def test_a_loop_that_stalled_while_the_robot_moved():
+    table = commands(hz=50.0)
+    gap = (table.t_ns > START_NS + ns(4.0)) & (table.t_ns < START_NS + ns(5.5))
+    halted = commands(hz=50.0)
+    halted = halted.replace(linear_velocity_xyz=np.where(
+        (halted.t_ns > START_NS + ns(3.99))[:, None], 0.0, halted["linear_velocity_xyz"]
+    ))  # fmt: skip
+    stalled = told(driven(command=table.take(~gap), plan=plans()))
+
+    assert [(f.id, f.severity) for f in stalled] == [("SR-LAT-002", "warning")]
+    assert stalled[0].value == pytest.approx(1.5, abs=0.03)
+    assert "moved 0.7" in stalled[0].message
+    assert told(driven(command=halted.take(~gap), plan=plans())) == ()  # it had been told to stand
+    assert [f.severity for f in told(driven(command=table.take(~gap)))] == ["info"]
+
+
+def test_findings_are_explained_and_bound_to_the_limits():
+    bundle = driven(command=commands(hz=50.0, seconds=20.0), plan=plans(seconds=20.0), seconds=20.0,
+                    edit=late_odometry(1.3))  # fmt: skip
+
+    assert [f.severity for f in told(bundle, position_m=2.0, yaw_rad=3.0)] == ["info"] * 2
+    assert all(f.id in FINDINGS for f in told(bundle))
 
 
 # --- the oracle ------------------------------------------------------------------------------

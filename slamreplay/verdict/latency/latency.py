@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from slamreplay.audit.streams import Stream
 from slamreplay.bundle.odometry import odometry_track
 from slamreplay.bundle.track import PoseTrack
 from slamreplay.bundle.view import BundleView
@@ -47,12 +49,15 @@ class Latency:
 
 @dataclass(frozen=True, eq=False)
 class Usage:
-    """One consumer's ages in a few numbers.
+    """One consumer's ages in a few numbers, each over the uses of the pose.
 
     Attributes:
         ages: all of them.
         correction: age of the localizer's last word.
         update: age of its last new word.
+        sensing_s: median time from scan to its arrival, None where that is not known,
+        answering_s: from there to the correction,
+        waiting_s: and from there to its use.
         pose: age of the pose that was used, after odometry carried it.
         unknown_m: how far the robot moved in that time.
         unknown_rad: by how much it turned.
@@ -62,13 +67,20 @@ class Usage:
     ages: Ages
     correction: Spread
     update: Spread
+    sensing_s: float | None
+    answering_s: float | None
+    waiting_s: float | None
     pose: Spread
     unknown_m: Spread
     unknown_rad: Spread
     over: tuple[float, float, float] | None
 
 
-def latency(view: BundleView, budgets: Budgets = Budgets()) -> Latency:  # noqa: B008 - frozen
+def latency(
+    view: BundleView,
+    budgets: Budgets = Budgets(),  # noqa: B008 - frozen
+    streams: Sequence[Stream] | None = None,
+) -> Latency:
     """How old the pose was whenever somebody used it, on the log as it was recorded.
 
     A word counts from when it was recorded: on the robot it was there a moment sooner or later.
@@ -76,8 +88,10 @@ def latency(view: BundleView, budgets: Budgets = Budgets()) -> Latency:  # noqa:
     Args:
         view: the log.
         budgets: rates of controller and planner.
+        streams: those of the view, where somebody has them already.
     """
-    found, manifest = told_streams(view), view.manifest
+    found = told_streams(view) if streams is None else streams
+    manifest = view.manifest
     moving = [s for s in found if s.edge and not s.is_static
               and s.is_edge(manifest.frames.odom, manifest.frames.base)]  # fmt: skip
     sensors = [s for s in found if s.table in _SENSORS] + moving
@@ -100,6 +114,9 @@ def usages(of: Latency) -> tuple[Usage, ...]:
                 one,
                 spread(one.correction_s),
                 spread(one.update_s),
+                spread(one.sensing_s).p50,
+                spread(one.answering_s).p50,
+                spread(one.waiting_s).p50,
                 spread(one.pose_s),
                 spread(np.hypot(motion[:, 0], motion[:, 1])),
                 spread(np.abs(motion[:, 2])),

@@ -42,13 +42,13 @@ def spread(values: ArrayLike) -> Spread:
 
     The interval of p95 lies between two order statistics, whatever the distribution (David and
     Nagaraja 2003, Order Statistics, section 7.1), at ranks that hold for the effective number of
-    samples of "above p95 or not".
+    samples of "p95 and above, or not".
     """
     x = _finite(values)
     if not len(x):
         return Spread()
     p95 = float(np.percentile(x, 95.0))
-    n_eff = effective_samples((x > p95).astype(np.float64))
+    n_eff = effective_samples((x >= p95).astype(np.float64))
     low = high = None
     if n_eff >= FEWEST:
         lower, upper = share_interval(0.95, n_eff)
