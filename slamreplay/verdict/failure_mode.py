@@ -24,10 +24,9 @@ CLEAR = 1.5
 
 def failure_mode(case: Case) -> FailureMode:
     """The mode of a log, from its intervals and the motions around the loss that tells most."""
-    lost = episodes(case.intervals, lambda i: i.is_lost)
-    if not lost:
+    worst = telling(case.intervals, case.limits)
+    if worst is None:
         return _not_lost(case)
-    worst = _telling(lost, case.limits)
     onset = case.since_lost(worst)
     bold = bold_words(case.error, worst, case.sigma_belief_m, case.start_ns)
     questions: tuple[Callable[[], Answer | None], ...] = (
@@ -70,11 +69,12 @@ def _not_lost(case: Case) -> FailureMode:
     return FailureMode("none", None, ())
 
 
-def _telling(lost: Sequence[Interval], limits: Limits) -> Interval:
-    """The first episode that is more than borderline, else the first one."""
+def telling(intervals: Sequence[Interval], limits: Limits) -> Interval | None:
+    """The first lost episode that is more than borderline, else the first one, if there is any."""
+    lost = episodes(intervals, lambda i: i.is_lost)
     for i in lost:
         far = (i.max_error_m or 0.0) >= CLEAR * limits.position_m
         turned = (i.max_error_rad or 0.0) >= CLEAR * limits.yaw_rad
         if far or turned or i.duration_ns >= LASTING_NS:
             return i
-    return lost[0]
+    return lost[0] if lost else None

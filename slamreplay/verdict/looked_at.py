@@ -12,7 +12,7 @@ from slamreplay.bundle.track import PoseTrack
 from slamreplay.bundle.view import BundleView
 from slamreplay.verdict.case import Case
 from slamreplay.verdict.failure_mode import failure_mode
-from slamreplay.verdict.judgement import FailureMode, Interval
+from slamreplay.verdict.judgement import ConstantOffset, FailureMode, Interval
 from slamreplay.verdict.limits import Limits
 from slamreplay.verdict.map_fit import MapFit, map_fit
 from slamreplay.verdict.tiles import Evidence, gathered, intervals_of
@@ -33,6 +33,7 @@ class Looked:
         turned: odometry against hindsight, None without odometry.
         fit: how badly its scans fit the map, where that is why nothing can be judged.
         reason: why not, in words.
+        case: what the mode was looked for in; None where nothing can be judged.
     """
 
     intervals: tuple[Interval, ...]
@@ -42,6 +43,7 @@ class Looked:
     turned: Wheels | None = None
     fit: MapFit | None = None
     reason: str = ""
+    case: Case | None = None
 
 
 def looked_at(
@@ -65,11 +67,27 @@ def looked_at(
     evidence = gathered(view, belief, hindsight, limits, delay)
     intervals = intervals_of(view, evidence, limits)
     turned = wheels(view, evidence.error)
-    mode = _mode(view, belief, hindsight, evidence, intervals, limits, delay, turned)
-    return Looked(intervals, mode, evidence, delay, turned)
+    case = _case(view, belief, hindsight, evidence, intervals, limits, delay, turned)
+    mode = _mode(case, evidence.offset)
+    return Looked(intervals, mode, evidence, delay, turned, case=case)
 
 
-def _mode(
+def _mode(case: Case, offset: ConstantOffset | None) -> FailureMode:
+    if offset is not None and offset.cause == "map":
+        spread = f"nine of ten moments within {offset.spread_m:.2f} m of it"
+        words = (
+            f"belief and map differ by one constant transform, {offset.text}: {spread}",
+            "no drift added up: the localizer kept correcting itself in the map it had",
+        )
+        return FailureMode("wrong_map", 0.9, words)
+    mode = failure_mode(case)
+    if offset is not None and offset.cause == "map_or_start" and mode.kind != "none":
+        text = f"a map frame shifted by {offset.text} would explain it equally well"
+        mode = replace(mode, confidence=0.5, evidence=(*mode.evidence, text))
+    return mode
+
+
+def _case(
     view: BundleView,
     belief: PoseTrack | None,
     hindsight: Hindsight,
@@ -78,15 +96,7 @@ def _mode(
     limits: Limits,
     delay: Delay | None,
     turned: Wheels | None,
-) -> FailureMode:
-    offset = evidence.offset
-    if offset is not None and offset.cause == "map":
-        spread = f"nine of ten moments within {offset.spread_m:.2f} m of it"
-        words = (
-            f"belief and map differ by one constant transform, {offset.text}: {spread}",
-            "no drift added up: the localizer kept correcting itself in the map it had",
-        )
-        return FailureMode("wrong_map", 0.9, words)
+) -> Case:
     error = evidence.error
     sigma = np.full(len(error.t_ns), np.nan)
     own = True
@@ -98,8 +108,4 @@ def _mode(
         u = u / np.maximum(np.hypot(u[:, 0], u[:, 1]), 1e-9)[:, None]
         with np.errstate(invalid="ignore"):
             sigma = np.sqrt(np.einsum("ni,nij,nj->n", u, cov, u))
-    mode = failure_mode(Case(view, error, hindsight, intervals, sigma, limits, delay, turned, own))
-    if offset is not None and offset.cause == "map_or_start" and mode.kind != "none":
-        text = f"a map frame shifted by {offset.text} would explain it equally well"
-        mode = replace(mode, confidence=0.5, evidence=(*mode.evidence, text))
-    return mode
+    return Case(view, error, hindsight, intervals, sigma, limits, delay, turned, own)

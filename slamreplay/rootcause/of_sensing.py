@@ -1,0 +1,77 @@
+"""What can be put back of sensors and map: wrong stamps, lost scans, people, the old map."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from slamreplay.geometry import se2
+from slamreplay.geometry.times import NS_PER_S, ns
+from slamreplay.rootcause.healing import Healed
+from slamreplay.rootcause.incident import Incident
+from slamreplay.rootcause.trial import Trial
+from slamreplay.verdict.judgement import ConstantOffset
+from slamreplay.verdict.scan_gaps import scan_gaps
+
+#: Scans of which so much was cut short, for so long, are worth a try.
+_CUT, _CUT_ROWS = 0.2, 10
+
+
+def clocks(incident: Incident, healed: Healed) -> Iterator[Trial]:
+    """The stamps as they are: each scan meets the odometry of another moment."""
+    delay = incident.case.delay
+    if delay is None or not delay.is_significant:
+        return
+    t, path = incident.t_ns, healed.evidence.odometry
+    met = se2.interpolate(t, path, np.clip(t + ns(delay.seconds), t[0], t[-1]))
+    name = "scan_delay.stamp" if delay.seconds > 0 else "tf_delay.odometry"
+    told = replace(healed.evidence, odometry=met)
+    words = f"stamps as recorded ({delay.text})"
+    yield Trial(name, "timing", abs(delay.seconds), "s", None, words, told)
+
+
+def gaps(incident: Incident, healed: Healed) -> Iterator[Trial]:
+    """The scans that never came."""
+    t = incident.t_ns
+    found = scan_gaps(incident.view, int(t[0]), int(t[-1]), recorded=incident.case.recorded)
+    if not incident.missing.any() or not found:
+        return
+    rows = zip(healed.evidence.beams, incident.missing, strict=True)
+    beams = tuple(None if gone else one for one, gone in rows)
+    worst = max(found, key=lambda gap: gap.end_ns - gap.start_ns)
+    seconds = (worst.end_ns - worst.start_ns) / NS_PER_S
+    at, words = incident.row_at(worst.start_ns), worst.text(incident.case.start_ns)
+    told = replace(healed.evidence, beams=beams)
+    yield Trial("scan_drop.burst", "timing", seconds, "s", at, f"missing scans ({words})", told)
+
+
+def people(healed: Healed) -> Iterator[Trial]:
+    """The beams that something cut short which is in no map."""
+    with np.errstate(invalid="ignore"):
+        cut = healed.cut_share >= _CUT
+    if cut.sum() < _CUT_ROWS:
+        return
+    rows = np.flatnonzero(cut)
+    share = float(np.mean(healed.cut_share[rows]))
+    words = f"what cut {100 * share:.0f} % of the beams short"
+    told = replace(healed.evidence, beams=healed.told_beams)
+    row = int(rows[0])
+    yield Trial("people.crowd", "association_error", share, "ratio", row, words, told)
+
+
+def maps(incident: Incident, healed: Healed, offset: ConstantOffset | None) -> Iterator[Trial]:
+    """The map as the robot had it, or one that lies elsewhere."""
+    e, changes = healed.evidence, incident.case.hindsight.changes
+    old = healed.told_grid
+    if changes is not None and not np.array_equal(e.grid.cells, old.cells):
+        area = sum(r.area_m2 for r in changes.regions)
+        words = f"the map as the robot had it, {area:.1f} m² of which is no longer true,"
+        yield Trial("map_stale.version", "stale_map_use", area, "m2", None, words,
+                    replace(e, grid=old))  # fmt: skip
+    if offset is not None and offset.cause != "lookalike":
+        words = f"a map that lies elsewhere ({offset.text})"
+        said = se2.compose(np.array(offset.xyyaw), healed.truth)
+        size = offset.at_robot_m
+        yield Trial("map_shift.offset", "wrong_map", size, "m", None, words, belief=said)
