@@ -9,8 +9,8 @@ from tempfile import TemporaryDirectory
 from slamreplay.bundle.schema import TABLES
 from slamreplay.bundle.view import Bundle
 from slamreplay.ingest.pipeline import ingest
-from slamreplay.simulate.recording import Recording
 from slamreplay.simulate.messages import Messages
+from slamreplay.simulate.recording import Recording
 from slamreplay.simulate.topics import Record, records
 from slamreplay.simulate.writer import write_log
 
