@@ -423,7 +423,7 @@ def test_people_are_deskewed_like_all_else():
 def test_nobody_hides_what_is_nearer_than_they_are():
     near = with_scans(BUNDLE, np.full((len(SCANS), 181), 0.2)).view()
 
-    with pytest.raises(NotApplicableError, match=r"people can hide 0\.00 of the beams, not 0\.1"):
+    with pytest.raises(NotApplicableError, match=r"people can hide 0\.0000 of the beams, not 0\.1"):
         perturbed("people.hidden", 0.1, near)
 
 

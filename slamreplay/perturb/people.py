@@ -66,5 +66,5 @@ class People:
                 return beams.with_ranges(ranges)
         share = (wanted - left) / valid
         raise NotApplicableError(
-            f"people can hide {share:.2f} of the beams, not {level:g}", where=self.name
+            f"people can hide {share:.4f} of the beams, not {level:g}", where=self.name
         )
