@@ -96,7 +96,6 @@ def test_a_scenario_stands_for_the_log_and_its_bundle_is_kept(recipe, tmp_path):
     [
         (["-p", "tf_delay=1"], "takes no --perturbation"),
         (["-e", "acml"], "did you mean 'amcl'"),
-        (["-e", "recorded"], "cannot be run again"),
         (["-e", "amcl", "-e", "amcl"], "named twice"),
         (["--seed", "-1"], "negative"),
         (["--seed", str(2**63)], "too large"),
