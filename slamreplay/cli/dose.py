@@ -104,10 +104,12 @@ def _evidence(
 ) -> Iterator[tuple[Bundle, bool]]:
     """The bundle, and whether it stays where it is after the block."""
     from slamreplay.cli import options
+    from slamreplay.cli.main import cache_folder
     from slamreplay.ingest.options import IngestOptions
 
+    bundles = cache_folder() / "bundles"
     if logs:
-        with options.evidence(logs, how) as bundle:
+        with options.evidence(logs, how, cache=bundles) as bundle:
             yield bundle, bundle.path is not None and bundle.path.resolve() == logs[0].resolve()
         return
     if recipe.scenario is None:
@@ -119,16 +121,24 @@ def _evidence(
             where=path,
             hint="leave them out, or name a LOG",
         )
-    from slamreplay.cli.progress import progress_bar
-    from slamreplay.simulate.pipeline import simulate
-
-    name, seed = recipe.scenario
     with TemporaryDirectory(prefix="slamreplay-") as folder:
-        log = Path(folder) / f"{name}.mcap"
-        with progress_bar("simulating"):
-            simulate(name, log, seed=seed)
-        with options.evidence([log], how) as bundle:
+        log = _simulated(recipe.scenario, Path(folder))
+        with options.evidence([log], how, cache=bundles) as bundle:
             yield bundle, False
+
+
+def _simulated(scenario: tuple[str, int], folder: Path) -> Path:
+    """The log, in the cache or else in a folder."""
+    from slamreplay.cli.main import cache_folder
+    from slamreplay.cli.progress import progress_bar
+    from slamreplay.errors import OutputError
+    from slamreplay.simulate.once import simulate_once
+
+    with progress_bar("simulating"):
+        try:
+            return simulate_once(*scenario, cache_folder() / "scenarios")
+        except OutputError:  # it costs time, nothing else
+            return simulate_once(*scenario, folder)
 
 
 def _told(results: DoseResults, log: Mapping[str, Any], trials: int) -> str:

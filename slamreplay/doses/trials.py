@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import Self
 
 from slamreplay.bundle.odometry import odometry_track
 from slamreplay.bundle.run import Run, Trial, run_bytes
@@ -14,7 +15,7 @@ from slamreplay.consistency.evidence.source import Reference
 from slamreplay.doses.judge import BASELINE, Judges
 from slamreplay.doses.measure import Measured, measured
 from slamreplay.doses.plan import Dose
-from slamreplay.replay.runner import replay
+from slamreplay.replay.runner import Replayer
 
 Progress = Callable[[str, float], None]
 
@@ -23,7 +24,7 @@ class Trials:
     """What is known so far of a log's trials.
 
     Runs are measured and let go, but for baselines and those of the first seed: hundreds of them
-    would not fit into memory.
+    would not fit into memory. It is a context: its workers end with it.
 
     Args:
         bundle: the log.
@@ -32,6 +33,7 @@ class Trials:
         judges: of the log.
         cache: folder of earlier runs.
         workers: processes that share the trials, one per core by default.
+        progress: told what is being done, and the share done of all that may come.
     """
 
     def __init__(
@@ -42,10 +44,14 @@ class Trials:
         judges: Judges,
         cache: Path | None,
         workers: int | None,
+        progress: Progress | None,
     ) -> None:
         self._bundle, self._parameters = bundle, parameters
         self._first_seed, self._judges = first_seed, judges
-        self._cache, self._workers = cache, workers
+        self._round, self._progress = (0, 1, 1), progress
+        self._replayer = Replayer(
+            bundle, progress=self._tell if progress else None, cache=cache, workers=workers
+        )
         self._view = bundle.view()
         self._odometry = odometry_track(self._view)
         self._judge_of: dict[str, Reference | None] = {}
@@ -53,6 +59,12 @@ class Trials:
         self._reasons: dict[Trial, str] = {}
         self._digests: dict[Trial, str] = {}
         self._runs: dict[Trial, Run] = {}
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *fault: object) -> None:
+        self._replayer.close()
 
     def baseline(self, estimator: str, seed: int) -> Trial:
         """The undisturbed trial."""
@@ -64,20 +76,27 @@ class Trials:
         return replace(self.baseline(estimator, seed), perturbation=dose.perturbation,
                        level=dose.level, unit=dose.unit)  # fmt: skip
 
-    def ask(self, trials: Iterable[Trial], progress: Progress | None = None) -> None:
+    def ask(self, trials: Iterable[Trial], most: int = 0) -> None:
         """Replay and measure those that are not known.
 
         A trial is held against the baseline of its seed, which is known or among them; where it is
         neither, all baselines are the same and the first seed's stands for it.
+
+        Args:
+            trials: of this log.
+            most: how many there may be in the end, for the share that is told.
         """
         fresh = [trial for trial in dict.fromkeys(trials) if trial not in self._numbers]
         fresh.sort(key=lambda trial: trial.perturbation is not None)
-        runs: Sequence[Run] = ()
         if fresh:
-            runs = replay(self._bundle, fresh, progress=progress, cache=self._cache,
-                          workers=self._workers)  # fmt: skip
-        for run in runs:
-            self._take(run)
+            self._round = self.known, len(fresh), max(most, self.known + len(fresh))
+            for run in self._replayer.replay(fresh):
+                self._take(run)
+
+    def _tell(self, words: str, share: float) -> None:
+        done, count, most = self._round
+        if self._progress is not None:
+            self._progress(words, (done + share * count) / most)
 
     def _take(self, run: Run) -> None:
         trial = run.trial
