@@ -171,7 +171,7 @@ def perturb(
         parse_perturbation(text)
     chosen = estimators or list(ESTIMATORS)
     for name in chosen:
-        ESTIMATORS.load(name)
+        ESTIMATORS.target(name)
     given = read_parameters(parameters, chosen, robot) if parameters else Configuration({}, ())
     for line in given.told:
         typer.echo(line, err=True)

@@ -18,8 +18,6 @@ from slamreplay.bundle.store import MANIFEST, is_bundle
 from slamreplay.bundle.view import Bundle
 from slamreplay.errors import BundleError, MapError
 from slamreplay.ingest.options import IngestOptions
-from slamreplay.ingest.pipeline import ingest
-from slamreplay.maps.map_server import read_map
 
 #: Bundles beyond so many bytes go, the least recently used first, but none of the last hour.
 MOST_BYTES = 4_000_000_000
@@ -53,6 +51,8 @@ def ingest_once(
         else:
             os.utime(target / MANIFEST)
             return found
+    from slamreplay.ingest.pipeline import ingest  # of no use where the bundle is there
+
     bundle = ingest(logs, target, options, progress=progress)
     _trim(cache, keep=target)
     return bundle
@@ -93,6 +93,8 @@ def _line(name: str, file: Path) -> bytes:
 
 def _map_version(path: Path) -> str:
     """What a yaml's map is, image included, and what had to be mended in it."""
+    from slamreplay.maps.map_server import read_map
+
     remarks: list[str] = []
     try:
         return " ".join([read_map(path, warn=remarks.append).version, *remarks])
