@@ -155,7 +155,7 @@ def perturb(
     if not logs:
         raise UsageError("there is no LOG to replay", hint="name one, or a lab with --recipe")
     from slamreplay.bundle.atomic import check_target
-    from slamreplay.cli.main import cache_folder
+    from slamreplay.cli.main import bundle_folder, run_folder, watch_folder
     from slamreplay.cli.progress import progress_bar
     from slamreplay.consistency.evidence.references import references_of
     from slamreplay.estimators import ESTIMATORS
@@ -163,7 +163,8 @@ def perturb(
     from slamreplay.replay.folder import RUNS, write_runs
     from slamreplay.replay.metrics import trial_metrics
     from slamreplay.replay.parameters import Configuration, read_parameters
-    from slamreplay.replay.runner import replay
+    from slamreplay.replay.runner import Replayer
+    from slamreplay.replay.watch import watched
     from slamreplay.report.metrics import asked_of, nees_metrics
 
     check_target(output, RUNS)
@@ -171,7 +172,7 @@ def perturb(
         parse_perturbation(text)
     chosen = estimators or list(ESTIMATORS)
     for name in chosen:
-        ESTIMATORS.load(name)
+        ESTIMATORS.target(name)
     given = read_parameters(parameters, chosen, robot) if parameters else Configuration({}, ())
     for line in given.told:
         typer.echo(line, err=True)
@@ -183,11 +184,17 @@ def perturb(
         start_s=start_s,
         end_s=end_s,
     )
-    with options.evidence(logs, how, cache=cache_folder() / "bundles") as bundle:
+    with (
+        watched(watch_folder(), output) as watch,
+        options.evidence(logs, how, cache=bundle_folder()) as bundle,
+    ):
         names = estimators or usual_estimators(bundle)
         trials = design(bundle, names, perturbations or (), seed or 0, given.of)
-        with progress_bar("replaying") as progress:
-            runs = replay(bundle, trials, progress=progress, cache=cache_folder() / "runs")
+        with (
+            progress_bar("replaying") as progress,
+            Replayer(bundle, progress=progress, cache=run_folder(), watch=watch) as replayer,
+        ):
+            runs = replayer.replay(trials)
         is_raw = bundle.path is None or bundle.path.resolve() != logs[0].resolve()
         write_runs(output, bundle, runs, keep_bundle=is_raw)
         view, references = bundle.view(), references_of(bundle, None)

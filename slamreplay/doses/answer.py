@@ -17,6 +17,8 @@ from slamreplay.doses.plan import Axis, Plan
 from slamreplay.doses.search import next_levels
 from slamreplay.doses.trials import Trials
 from slamreplay.replay.dose import Control, DoseCurve, DoseResults
+from slamreplay.replay.runner import Replayer
+from slamreplay.replay.watch import Watch
 
 Progress = Callable[[str, float], None]
 
@@ -63,6 +65,7 @@ def answer(
     cache: Path | None = None,
     workers: int | None = None,
     progress: Progress | None = None,
+    watch: Watch | None = None,
 ) -> Answer:
     """Replay what a design asks for, measure it, and say what broke first.
 
@@ -76,28 +79,33 @@ def answer(
         cache: folder of what was computed earlier: runs and hindsight.
         workers: processes that share the trials, one per core by default.
         progress: told what is being done, and the share done.
+        watch: told where every trial stands, for whoever looks on.
 
     Raises:
         UsageError: a trial names what does not exist, or a level that a perturbation refuses.
     """
     runs = None if cache is None else cache / "runs"
     judges = Judges(bundle, None if cache is None else cache / "hindsight", progress)
-    kept = (bundle, parameters, plan.seeds[0], judges, runs, workers, progress)
-    with Trials(*kept) as trials:
-        first = [trials.baseline(e, seed) for e in plan.estimators for seed in plan.seeds[:2]]
-        trials.ask(first, plan.most_trials)
-        pairs = _pairs(bundle, plan, trials)
-        levels: dict[_Pair, dict[float, None]] = {pair: {} for pair in pairs}
-        wanted = [trials.baseline(p.estimator, seed) for p in pairs for seed in p.baseline_seeds]
-        wanted += [trials.dosed(p.estimator, plan.seeds[0], no_op_of(p.axis)) for p in pairs]
-        most = trials.known + len(wanted) + sum(len(p.seeds) * p.axis.most_levels for p in pairs)
-        while True:
-            wanted += _positives(trials, plan, pairs)
-            wanted += _next(trials, plan, levels)
-            if all(trials.numbers(trial) is not None for trial in wanted):
-                break
-            trials.ask(wanted, most)
-            wanted = []
+    with Replayer(bundle, cache=runs, workers=workers, watch=watch) as replayer:
+        trials = Trials(bundle, parameters, plan.seeds[0], judges, replayer)
+        return _answered(bundle, plan, trials, progress)
+
+
+def _answered(bundle: Bundle, plan: Plan, trials: Trials, progress: Progress | None) -> Answer:
+    trials.ask((trials.baseline(e, s) for e in plan.estimators for s in plan.seeds[:2]), progress)
+    pairs = _pairs(bundle, plan, trials)
+    levels: dict[_Pair, dict[float, None]] = {pair: {} for pair in pairs}
+    wanted = {trials.baseline(p.estimator, seed): None for p in pairs for seed in p.baseline_seeds}
+    wanted |= {trials.dosed(p.estimator, plan.seeds[0], no_op_of(p.axis)): None for p in pairs}
+    most = trials.known + len(wanted) + sum(len(p.seeds) * p.axis.most_levels for p in pairs)
+    while True:
+        wanted |= dict.fromkeys(_positives(trials, plan, pairs))
+        wanted |= dict.fromkeys(_next(trials, plan, levels))
+        fresh = [trial for trial in wanted if trials.numbers(trial) is None]
+        if not fresh:
+            break
+        trials.ask(fresh, _share_of(progress, trials.known, len(fresh), most))
+        wanted = {}
     results = DoseResults(
         question=plan.question,
         seeds=plan.seeds,
@@ -188,3 +196,11 @@ def _controls(plan: Plan, trials: Trials, pairs: list[_Pair]) -> tuple[Control, 
     found = [no_op(trials, plan, pair.estimator, pair.axis) for pair in pairs]
     whose = dict.fromkeys(pair.estimator for pair in pairs)
     return (*found, *(positive(trials, plan, estimator) for estimator in whose))
+
+
+def _share_of(progress: Progress | None, done: int, count: int, most: int) -> Progress | None:
+    """A share of one round, told as that of all trials that may come."""
+    if progress is None:
+        return None
+    whole = max(most, done + count)
+    return lambda words, share: progress(words, (done + share * count) / whole)

@@ -5,8 +5,6 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
-from pathlib import Path
-from typing import Self
 
 from slamreplay.bundle.odometry import odometry_track
 from slamreplay.bundle.run import Run, Trial, run_bytes
@@ -24,16 +22,14 @@ class Trials:
     """What is known so far of a log's trials.
 
     Runs are measured and let go, but for baselines and those of the first seed: hundreds of them
-    would not fit into memory. It is a context: its workers end with it.
+    would not fit into memory.
 
     Args:
         bundle: the log.
         parameters: canonical JSON by estimator, for those that do not run with their defaults.
         first_seed: whose runs are kept.
         judges: of the log.
-        cache: folder of earlier runs.
-        workers: processes that share the trials, one per core by default.
-        progress: told what is being done, and the share done of all that may come.
+        replayer: of the log; it does every round.
     """
 
     def __init__(
@@ -42,16 +38,11 @@ class Trials:
         parameters: Mapping[str, str],
         first_seed: int,
         judges: Judges,
-        cache: Path | None,
-        workers: int | None,
-        progress: Progress | None,
+        replayer: Replayer,
     ) -> None:
         self._bundle, self._parameters = bundle, parameters
         self._first_seed, self._judges = first_seed, judges
-        self._round, self._progress = (0, 1, 1), progress
-        self._replayer = Replayer(
-            bundle, progress=self._tell if progress else None, cache=cache, workers=workers
-        )
+        self._replayer = replayer
         self._view = bundle.view()
         self._odometry = odometry_track(self._view)
         self._judge_of: dict[str, Reference | None] = {}
@@ -59,12 +50,6 @@ class Trials:
         self._reasons: dict[Trial, str] = {}
         self._digests: dict[Trial, str] = {}
         self._runs: dict[Trial, Run] = {}
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *fault: object) -> None:
-        self._replayer.close()
 
     def baseline(self, estimator: str, seed: int) -> Trial:
         """The undisturbed trial."""
@@ -76,7 +61,7 @@ class Trials:
         return replace(self.baseline(estimator, seed), perturbation=dose.perturbation,
                        level=dose.level, unit=dose.unit)  # fmt: skip
 
-    def ask(self, trials: Iterable[Trial], most: int = 0) -> None:
+    def ask(self, trials: Iterable[Trial], progress: Progress | None = None) -> None:
         """Replay and measure those that are not known.
 
         A trial is held against the baseline of its seed, which is known or among them; where it is
@@ -84,19 +69,13 @@ class Trials:
 
         Args:
             trials: of this log.
-            most: how many there may be in the end, for the share that is told.
+            progress: told what is being done, and the share done.
         """
         fresh = [trial for trial in dict.fromkeys(trials) if trial not in self._numbers]
         fresh.sort(key=lambda trial: trial.perturbation is not None)
         if fresh:
-            self._round = self.known, len(fresh), max(most, self.known + len(fresh))
-            for run in self._replayer.replay(fresh):
+            for run in self._replayer.replay(fresh, progress=progress):
                 self._take(run)
-
-    def _tell(self, words: str, share: float) -> None:
-        done, count, most = self._round
-        if self._progress is not None:
-            self._progress(words, (done + share * count) / most)
 
     def _take(self, run: Run) -> None:
         trial = run.trial
