@@ -152,7 +152,8 @@ def test_a_golden_recipe_asks_the_same(recipe):
         assert full.scenario in (None, golden.scenario)
         assert is_part(golden.plan, full.plan)
         return
-    assert (full.question, full.lab, full.seed) == (golden.question, golden.lab, golden.seed)
+    for name in ("question", "lab", "scenario", "seed"):
+        assert getattr(full, name, None) == getattr(golden, name, None)
     assert is_smaller(golden.parameters.model_dump(), full.parameters.model_dump())
 
 
@@ -245,7 +246,7 @@ HOSTILE = {
     "lab misspelt": (SMALL.replace("covariance_breathing", "covariance_breathin"), "did you mean"),
     "lab elsewhere": (SMALL.replace("lab: covariance_breathing", "lab: os:system"), "no lab"),
     "key of lab misspelt": (SMALL.replace("lab:", "labb:"), "did you mean 'lab'?"),
-    "no lab": ("version: 1\n", "the key 'lab' or 'perturbations' is missing"),
+    "no lab": ("version: 1\n", "the key 'lab', 'perturbations' or 'budget' is missing"),
     "key": (SMALL.replace("step_m:", "stp_m:", 1), "'parameters.stp_m' (hint"),
     "parameter": (SMALL.replace("range_sigma_m:", "range_sigma:"), "mean 'range_sigma_m'?"),
     "nested": (SMALL.replace("grows_from_ratio", "grows_ratio"), "mean 'grows_from_ratio'?"),

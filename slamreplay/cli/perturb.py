@@ -103,19 +103,29 @@ def perturb(
 
     The table shows how far each run is from the undisturbed run of the same estimator. A recipe
     that is a design says which levels of which perturbations are tried, or searches for the level
-    at which an estimator breaks; its answer lies beside the runs. One that is a lab simulates what
-    it needs, takes no LOG and writes its answer to the folder.
+    at which an estimator breaks; its answer lies beside the runs. One that is a budget asks how old
+    poses were in the LOG, or in the scenario it names; one that is a lab simulates what it needs
+    and takes no LOG. Both write their answer to the folder.
     """
+    how = options.ingest_options(
+        map_yaml=map_yaml,
+        topics=topics,
+        robot=robot,
+        reference=reference,
+        start_s=start_s,
+        end_s=end_s,
+    )
     if recipe is not None:
         from slamreplay.cli.lab import run_lab
-        from slamreplay.recipes import LabRecipe, read_recipe
+        from slamreplay.recipes import BudgetRecipe, LabRecipe, read_recipe
 
         asked = read_recipe(recipe)
-        only_logs = {
-            "LOG": logs,
+        of_runs: dict[str, object] = {
             "--perturbation": perturbations,
             "--estimator": estimators,
             "--parameters": parameters,
+        }
+        of_logs: dict[str, object] = {
             "--map": map_yaml,
             "--topics": topics,
             "--robot": robot,
@@ -123,9 +133,18 @@ def perturb(
             "--start": start_s,
             "--end": end_s,
         }
-        foreign = [name for name, value in only_logs.items() if value not in (None, [])]
+        is_lab = isinstance(asked, LabRecipe)
+        foreign = {"LOG": logs, **of_runs, **of_logs} if is_lab else of_runs
+        names = [name for name, value in foreign.items() if value not in (None, [])]
         if isinstance(asked, LabRecipe):
-            run_lab(asked, recipe, output, seed=seed, given=foreign, as_json=as_json)
+            run_lab(asked, recipe, output, seed=seed, given=names, as_json=as_json)
+            return
+        if isinstance(asked, BudgetRecipe):
+            from slamreplay.cli.budget import run_budget
+
+            run_budget(
+                asked, recipe, logs or (), how, output, seed=seed, given=names, as_json=as_json
+            )
             return
         from slamreplay.cli.dose import run_design
 
@@ -137,14 +156,7 @@ def perturb(
             recipe,
             output,
             logs=logs or (),
-            how=options.ingest_options(
-                map_yaml=map_yaml,
-                topics=topics,
-                robot=robot,
-                reference=reference,
-                start_s=start_s,
-                end_s=end_s,
-            ),
+            how=how,
             estimators=estimators or (),
             parameters=parameters or (),
             robot=robot,
@@ -176,14 +188,6 @@ def perturb(
     given = read_parameters(parameters, chosen, robot) if parameters else Configuration({}, ())
     for line in given.told:
         typer.echo(line, err=True)
-    how = options.ingest_options(
-        map_yaml=map_yaml,
-        topics=topics,
-        robot=robot,
-        reference=reference,
-        start_s=start_s,
-        end_s=end_s,
-    )
     with (
         watched(watch_folder(), output) as watch,
         options.evidence(logs, how, cache=bundle_folder()) as bundle,
