@@ -2,38 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from slamreplay.bundle.products import Hindsight
 from slamreplay.bundle.track import PoseTrack
 from slamreplay.bundle.view import BundleView
 from slamreplay.estimators.amcl.config import AmclConfig
-from slamreplay.rootcause import of_filter, of_motion, of_sensing
+from slamreplay.rootcause.calibration import Calibration, shipped_calibration
 from slamreplay.rootcause.healing import Healed, healed
 from slamreplay.rootcause.incident import Incident, incident_of
-from slamreplay.rootcause.likelihood import log_likelihood, moments
-from slamreplay.rootcause.replays import Replay, replayed
+from slamreplay.rootcause.likelihood import moments
 from slamreplay.rootcause.result import Candidate, RootCause
-from slamreplay.rootcause.trial import Trial
-from slamreplay.verdict.judgement import ConstantOffset
+from slamreplay.rootcause.trying import Tried, tried_of
+from slamreplay.verdict.belief_error import belief_error
+from slamreplay.verdict.judgement import Interval
 from slamreplay.verdict.limits import Limits
 from slamreplay.verdict.looked_at import Looked, looked_at
-
-#: Replays of each trial, with different random numbers.
-SEEDS = 3
-
-
-@dataclass(frozen=True, eq=False)
-class Tried:
-    """A trial and what came of it."""
-
-    trial: Trial
-    replays: tuple[Replay, ...]
-    log_likelihood: float
 
 
 def root_cause(
@@ -41,104 +27,131 @@ def root_cause(
     belief: PoseTrack | None,
     hindsight: Hindsight | None,
     limits: Limits | None = None,
+    calibration: Calibration | None = None,
 ) -> RootCause | None:
-    """What the failure of a log began with; None where nothing failed, or nothing can be told.
+    """What the failure of a log began with.
 
     Args:
         view: the log.
         belief: base in map as the robot believed it.
         hindsight: where it really was.
-        limits: what counts as lost.
+        limits: what counts as lost and as changed.
+        calibration: from likelihoods to probabilities; the shipped one by default.
+
+    Returns:
+        None where nothing failed. Where something did and nothing can be tried, the answer has the
+        verdict's failure mode and says why.
     """
     limits = Limits() if limits is None else limits
-    if belief is None or hindsight is None or not len(hindsight.track):
+    weights = shipped_calibration() if calibration is None else calibration
+    if hindsight is None or not len(hindsight.track):
         return None
+    if not hindsight.parts:
+        return _of(view, belief, hindsight, limits, weights)
+    found = []
+    for part in hindsight.parts:
+        one = _of(view.within(part.stretch), belief, part.hindsight, limits, weights)
+        found += [] if one is None else [one]
+    return max(found, key=lambda one: len(one.candidates), default=None)
+
+
+def _of(
+    view: BundleView,
+    belief: PoseTrack | None,
+    hindsight: Hindsight,
+    limits: Limits,
+    weights: Calibration,
+) -> RootCause | None:
+    """Of a log, or of a stretch of it with one map."""
     looked = looked_at(view, belief, hindsight, limits)
-    if looked.case is None:
-        return None
-    incident = incident_of(looked.case, belief, limits)
+    incident = None if belief is None else _incident(looked, belief, hindsight, limits)
     if incident is None:
-        return None
+        return _told(looked, weights)
     put_right = healed(incident, AmclConfig())
     if put_right is None:
+        return _told(looked, weights)
+    return _answer(incident, put_right, tried_of(incident, put_right, looked), weights)
+
+
+def _incident(
+    looked: Looked, belief: PoseTrack, hindsight: Hindsight, limits: Limits
+) -> Incident | None:
+    """The loss; of a belief in a map that lies elsewhere, its whole stretch."""
+    case = looked.case
+    if case is None:
         return None
-    tried = tried_of(incident, put_right, looked)
-    return _answer(incident, put_right, tried)
-
-
-def tried_of(incident: Incident, put_right: Healed, looked: Looked) -> list[Tried]:
-    """Every trial replayed and weighed; the control, with nothing put back, comes first."""
-    rows = moments(incident)
     offset = None if looked.evidence is None else looked.evidence.offset
-    control = Trial("", "none", None, "", None, "nothing", put_right.evidence)
-    out = []
-    for trial in (control, *_trials(incident, put_right, offset)):
-        replays = _replays(trial)
-        value = log_likelihood(incident, put_right.truth, replays, rows)
-        out.append(Tried(trial, replays, value))
-    return out
+    if offset is not None and offset.cause == "map":
+        whole = Interval("lost", *case.view.span)
+        error = belief_error(belief, hindsight, limits)
+        case = replace(case, error=error, intervals=(whole,))
+    return incident_of(case, belief, limits)
 
 
-def _trials(
-    incident: Incident, put_right: Healed, offset: ConstantOffset | None
-) -> Iterator[Trial]:
-    yield from of_motion.starts(incident, put_right)
-    yield from of_motion.motions(incident, put_right)
-    yield from of_sensing.clocks(incident, put_right)
-    yield from of_sensing.gaps(incident, put_right)
-    yield from of_sensing.people(put_right)
-    yield from of_sensing.maps(incident, put_right, offset)
-    yield from of_filter.trusts(incident, put_right)
-    yield from of_filter.uncorrected(incident, put_right)
-    yield from of_filter.jumps(incident, put_right)
+def _told(looked: Looked, weights: Calibration) -> RootCause | None:
+    """What the verdict says of a failure that no replay of a filter can show."""
+    mode, case = looked.mode, looked.case
+    failed = case is None or any(i.is_lost or i.is_changed for i in looked.intervals)
+    if mode.kind == "none" or not failed:
+        return None
+    bad = [i for i in looked.intervals if i.is_lost or i.is_changed] or list(looked.intervals)
+    text = "; ".join(mode.evidence)
+    probability = weights.unplayed.get(mode.kind, mode.confidence)
+    if probability is None:
+        return None
+    only = Candidate(mode.kind, None, None, "", None, 0.0, probability, text)
+    reason = "" if case is not None else looked.reason
+    start, end = bad[0].start_ns, bad[-1].end_ns
+    return RootCause(start, end, mode.kind, probability, (only,), 0, reason)
 
 
-def _replays(trial: Trial) -> tuple[Replay, ...]:
-    if trial.evidence is None:
-        assert trial.belief is not None
-        return (Replay(trial.belief, np.full(len(trial.belief), np.nan), 0),)
-    return tuple(replayed(trial.evidence, seed) for seed in range(SEEDS))
-
-
-def _answer(incident: Incident, put_right: Healed, tried: list[Tried]) -> RootCause:
-    values = np.array([one.log_likelihood for one in tried])
-    chance = np.exp(values - values.max())
-    chance /= chance.sum()
-    order = np.argsort(-values, kind="stable")
-    candidates = tuple(
-        _candidate(incident, put_right, tried[k], float(chance[k])) for k in order.tolist()
-    )
-    kind = candidates[0].kind
-    of_kind = sum(c.probability for c in candidates if c.kind == kind)
+def _answer(
+    incident: Incident, put_right: Healed, tried: list[Tried], weights: Calibration
+) -> RootCause:
+    chance = weights.probabilities(tried)
+    order = sorted(range(len(tried)), key=lambda k: -chance[k])
+    candidates = tuple(_candidate(incident, put_right, tried, k, chance[k]) for k in order)
+    by_kind: dict[str, float] = {}
+    for one in candidates:
+        by_kind[one.kind] = by_kind.get(one.kind, 0.0) + one.probability
+    best = max(candidates, key=lambda one: by_kind[one.kind])
+    replays = {id(r) for one in tried for r in one.replays}
     return RootCause(
         incident.onset_ns,
         int(incident.t_ns[-1]),
-        kind,
-        min(of_kind, 1.0),
+        best.kind,
+        min(by_kind[best.kind], 1.0),
         candidates,
-        sum(len(one.replays) for one in tried if one.trial.evidence is not None),
+        len(replays),
     )
 
 
-def _candidate(incident: Incident, put_right: Healed, one: Tried, chance: float) -> Candidate:
+def _candidate(
+    incident: Incident, put_right: Healed, tried: list[Tried], k: int, chance: float
+) -> Candidate:
+    one = tried[k]
     trial = one.trial
-    start = None if trial.row is None else int(incident.t_ns[trial.row])
-    text = _text(incident, put_right, one)
-    name = trial.name or None
-    return Candidate(
-        trial.kind, name, trial.level, trial.unit, start, one.log_likelihood, chance, text
-    )
-
-
-def _text(incident: Incident, put_right: Healed, one: Tried) -> str:
     rows = moments(incident)
-    seen = _far(incident.belief[rows], put_right.truth[rows])
-    made = np.array([_far(r.xyyaw[rows], put_right.truth[rows]).max() for r in one.replays])
-    return (
-        f"{one.trial.words} takes the belief up to {np.median(made):.2f} m off, "
-        f"seen {seen.max():.2f} m"
+    truth = put_right.truth[rows]
+    seen = _furthest(incident.belief[rows], truth)
+    made, without = (
+        float(np.median([_furthest(r.xyyaw[rows], truth) for r in each.replays]))
+        for each in (one, tried[0])
+    )
+    text = f"with {trial.words} the belief gets {made:.2f} m off"
+    text += "" if k == 0 else f", without it {without:.2f} m"
+    start = None if trial.row is None else int(incident.t_ns[trial.row])
+    return Candidate(
+        trial.kind,
+        trial.name or None,
+        trial.level,
+        trial.unit,
+        start,
+        one.log_likelihood,
+        chance,
+        f"{text}; seen: {seen:.2f} m",
     )
 
 
-def _far(poses: NDArray[np.float64], truth: NDArray[np.float64]) -> NDArray[np.float64]:
-    return np.asarray(np.hypot(*(poses - truth)[:, :2].T))
+def _furthest(poses: np.ndarray, truth: np.ndarray) -> float:
+    return float(np.hypot(*(poses - truth)[:, :2].T).max(initial=0.0))

@@ -20,6 +20,9 @@ STEP_NS = NS_PER_S // 2
 NOISE_M, NOISE_RAD, SHARE, RAD_PER_M = 0.05, np.radians(2.0), 0.12, np.radians(2.0)
 #: Stretches this near to each other are one; one of less in all is noise.
 NEAR_NS, LEAST_M, LEAST_RAD = NS_PER_S, 0.2, np.radians(7.0)
+#: A turn that wheels do not count, of a robot that hardly drives, is made by somebody; log odds of
+#: what is clear.
+_TURNED_RAD, _SURE = np.radians(25.0), 4.0
 
 
 @dataclass(frozen=True)
@@ -41,9 +44,21 @@ class Slip:
     counted_m: float
 
     @property
-    def is_carried(self) -> bool:
-        """Whether it moved while its wheels stood still."""
-        return self.moved_m >= CARRIED_M and self.counted_m < CARRIED_SHARE * self.moved_m
+    def log_carried(self) -> float:
+        """Log odds that somebody moved the robot, against wheels that slipped, from motion alone.
+
+        Wheels that spin count more than the robot moves; one that is lifted or shoved moves more
+        than its wheels count, or is turned where it stands.
+        """
+        more = self.moved_m - self.counted_m
+        turned = abs(self.radians) / _TURNED_RAD
+        if more >= CARRIED_M and self.counted_m < CARRIED_SHARE * self.moved_m:
+            return _SURE
+        if more >= 0.5 * CARRIED_M and more >= 0.25 * self.moved_m:
+            return 0.5 * _SURE
+        if turned >= 1.0 and self.counted_m < CARRIED_M:
+            return 0.5 * _SURE
+        return -_SURE if more < -CARRIED_M else -0.25 * _SURE
 
 
 def calibrated(odometry: se2.Array, wheels: Wheels | None) -> se2.Array:

@@ -13,12 +13,11 @@ from slamreplay.geometry import se2
 from slamreplay.maps.grid import FREE, OCCUPIED, OccupancyGrid
 from slamreplay.rootcause.beams import Rows, beams_of, cleared
 from slamreplay.rootcause.doses import Slip, calibrated, healed_steps, slips_of
+from slamreplay.rootcause.first_pose import right_start
 from slamreplay.rootcause.incident import Incident
 from slamreplay.rootcause.replays import Evidence
 from slamreplay.rootcause.tracks import filled, put_together, steps_of
 
-#: A start that hindsight gives is told as a careful person would click it: m, m, rad.
-START_COV = np.diag([0.15, 0.15, np.radians(5.0)]) ** 2
 #: Map beyond the way that the laser may reach and particles may stray to, m.
 _AROUND_M = 15.0
 
@@ -75,8 +74,8 @@ def healed(incident: Incident, config: AmclConfig) -> Healed | None:
     new = cropped(corrected(grid, incident.case.hindsight.changes), seen)
     came = beams_of(incident, scans, config, new, truth)
     clear, share = cleared(came, new, truth)
-    start = put_together(truth[0], steps)
-    evidence = Evidence(start, clear, new, truth[0], START_COV, config)
+    path = put_together(truth[0], steps)
+    evidence = Evidence(path, clear, new, *right_start(incident, truth), config)
     return Healed(evidence, truth, told, steps, slips, came, share, old)
 
 

@@ -11,7 +11,7 @@ from slamreplay.bundle.odometry import odometry_track
 from slamreplay.bundle.track import PoseTrack
 from slamreplay.bundle.view import BundleView
 from slamreplay.geometry import se2
-from slamreplay.geometry.times import NS_PER_S
+from slamreplay.geometry.times import NS_PER_S, ns
 from slamreplay.verdict.case import Case
 from slamreplay.verdict.failure_mode import telling
 from slamreplay.verdict.judgement import Interval
@@ -35,7 +35,7 @@ class Incident:
         where: (N, 3) hindsight, NaN where it does not know.
         belief: (N, 3) what the robot believed, NaN before its first word.
         cov: (N, 3, 3) the covariance it published, NaN without one.
-        odometry: (N, 3) base in odom, NaN where the log has none.
+        odometry: (N, 3) base in odom when the scans were really taken; NaN where there is none.
         known: (N,) rows at which hindsight can be trusted.
         from_start: whether the stretch begins with the belief's first word.
     """
@@ -90,7 +90,11 @@ def incident_of(case: Case, belief: PoseTrack, limits: Limits) -> Incident | Non
     t_ns = t_ns[order]
     missing = at < 0
     odometry = odometry_track(case.view)
-    odom = np.full((len(t_ns), 3), np.nan) if odometry is None else odometry.at(t_ns).xyyaw
+    delay = case.delay
+    late_ns = 0 if delay is None or not delay.is_significant else ns(delay.seconds)
+    odom = np.full((len(t_ns), 3), np.nan)
+    if odometry is not None:
+        odom = odometry.at(t_ns - late_ns).xyyaw
     known = error.known[at] & ~missing
     return Incident(
         case,

@@ -58,8 +58,9 @@ def log_likelihood(
     each = []
     for one, errors in zip(replays, made, strict=True):
         metres, radians = np.hypot(*errors[:, :2].T), np.abs(se2.wrap_angle(errors[:, 2]))
-        scale_m = np.sqrt(FLOOR_M**2 + (SHARE * metres) ** 2 + spread_m**2)
-        scale_rad = np.sqrt(FLOOR_RAD**2 + (SHARE * radians) ** 2 + spread_rad**2)
+        share = SHARE if one.by_chance else 0.0
+        scale_m = np.sqrt(FLOOR_M**2 + (share * metres) ** 2 + spread_m**2)
+        scale_rad = np.sqrt(FLOOR_RAD**2 + (share * radians) ** 2 + spread_rad**2)
         off_m = np.hypot(*(seen - errors)[:, :2].T)
         off_rad = np.abs(se2.wrap_angle(seen[:, 2] - errors[:, 2]))
         value = student(off_m / scale_m, 2) - 2.0 * np.log(scale_m)

@@ -7,11 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from slamreplay.estimators.amcl.laser import Beams
 from slamreplay.geometry import se2
 from slamreplay.geometry.times import NS_PER_S
-from slamreplay.rootcause.healing import START_COV, Healed
+from slamreplay.rootcause.first_pose import START_COV
+from slamreplay.rootcause.healing import Healed
 from slamreplay.rootcause.incident import Incident
-from slamreplay.rootcause.tracks import put_together
 from slamreplay.rootcause.trial import Trial
 
 #: Process noise of a filter that trusts itself too much, as a share of nav2_amcl's variances, and
@@ -32,7 +33,7 @@ def trusts(incident: Incident, healed: Healed) -> Iterator[Trial]:
         noise = {f"alpha{k}": ratio * getattr(config, f"alpha{k}") for k in range(1, 6)}
         sure = replace(config, **noise, min_particles=_FEW, max_particles=_FEW)
         told = replace(healed.evidence, config=sure, odometry=odometry)
-        words = f"a filter that takes {ratio:g} of the process noise, with {_FEW} particles,"
+        words = f"a filter that takes {ratio:g} of the process noise, with {_FEW} particles"
         yield Trial(
             "process_noise_scale.ratio", "overconfidence", ratio, "ratio", None, words, told
         )
@@ -40,14 +41,17 @@ def trusts(incident: Incident, healed: Healed) -> Iterator[Trial]:
 
 def uncorrected(incident: Incident, healed: Healed) -> Iterator[Trial]:
     """Nothing that takes errors of motion out."""
-    rows = np.flatnonzero(np.isfinite(incident.belief).all(axis=1))
-    if not len(rows) or not np.isfinite(incident.odometry).all():
+    if not np.isfinite(incident.odometry).all():
         return
-    first = int(rows[0])
-    start = se2.compose(incident.belief[first], se2.between(healed.truth[first], healed.truth[0]))
-    path = put_together(start, healed.told_steps)
+    blind = tuple(None if one is None else _nothing(one) for one in healed.evidence.beams)
+    odometry = healed.odometry_of(healed.told_steps)
+    told = replace(healed.evidence, odometry=odometry, beams=blind)
     words = "small errors of motion that no scan took out"
-    yield Trial("", "optimization_drift", None, "", None, words, belief=path)
+    yield Trial("", "optimization_drift", None, "", None, words, told)
+
+
+def _nothing(beams: Beams) -> Beams:
+    return replace(beams, bearings=np.zeros(0), ranges_m=np.zeros(0))
 
 
 def jumps(incident: Incident, healed: Healed) -> Iterator[Trial]:

@@ -8,73 +8,81 @@ from dataclasses import replace
 import numpy as np
 
 from slamreplay.geometry import se2
-from slamreplay.rootcause.doses import Slip
-from slamreplay.rootcause.healing import START_COV, Healed
+from slamreplay.rootcause.first_pose import START_COV, WIDE_M, first_told, wider
+from slamreplay.rootcause.healing import Healed
 from slamreplay.rootcause.incident import Incident
+from slamreplay.rootcause.likelihood import student
 from slamreplay.rootcause.trial import Trial
 from slamreplay.rootcause.words import apart
-from slamreplay.verdict.judgement import FailureKind
 
-#: A start within this of the truth, m and rad, is as right as a careful person clicks it; one that
-#: its own covariance does not reach (Mahalanobis distance squared of three numbers, 99.9 %) is not.
-_CLICKED_M, _CLICKED_RAD, _REACH = 0.35, np.radians(12.0), 16.3
+#: How far off a start is that somebody told wrongly, m; replays of a start that chance decides on.
+_MISTAKE_M, SEEDS = 3.0, 6
+#: A dose alone never says more than this, in nats: it may be there and do no harm.
+_MOST = 8.0
 
 
 def starts(incident: Incident, healed: Healed) -> Iterator[Trial]:
-    """The first pose as it was told, with the covariance it was told with."""
-    rows = np.flatnonzero(np.isfinite(incident.belief).all(axis=1))
-    if not incident.from_start or not len(rows):
+    """The first pose as it was told, with the covariance it was told with: wrong, or vague."""
+    told = first_told(incident, healed.truth)
+    if told is None or not incident.from_start:
         return
-    first = int(rows[0])
-    said, cov = incident.belief[first], _sound(incident.cov[first])
-    off = said - healed.truth[first]
-    off[2] = se2.wrap_angle(off[2])
+    pose, cov, off = told
     metres, turn = float(np.hypot(off[0], off[1])), float(abs(off[2]))
-    evidence = replace(healed.evidence, start=said, cov=cov)
-    if metres <= _CLICKED_M and turn <= _CLICKED_RAD:
-        wide = float(np.sqrt(np.linalg.eigvalsh(cov[:2, :2])[-1]))
-        words = f"the first pose, told to within {wide:.1f} m,"
-        yield Trial("", "sensing_ambiguity", wide, "m", 0, words, evidence)
-        return
-    words = f"the first pose, {apart(metres, turn)} off,"
-    yield Trial("initial_pose.offset", "wrong_initial_pose", metres, "m", 0, words, evidence)
+    evidence = replace(healed.evidence, start=pose, cov=cov)
+    plain, more = _honest(off, START_COV), wider(cov)
+    wide = float(np.sqrt(np.linalg.eigvalsh(more[:2, :2])[-1]))
+    wrong, vague = _mistaken(metres, turn) - plain, _honest(off, START_COV + more) - plain
+    above = max(wrong, vague if wide > WIDE_M else wrong) - _MOST
+    wrong, vague = (odds - max(above, 0.0) for odds in (wrong, vague))
+    if wide > WIDE_M:
+        words = f"the first pose, told to within {wide:.1f} m and {apart(metres, turn)} off"
+        yield Trial("", "sensing_ambiguity", wide, "m", 0, words, evidence,
+                    log_dose=max(vague, -_MOST), seeds=SEEDS)  # fmt: skip
+    words = f"the first pose as it was told, {apart(metres, turn)} off"
+    yield Trial("initial_pose.offset", "wrong_initial_pose", metres, "m", 0, words, evidence,
+                log_dose=max(wrong, -_MOST), seeds=SEEDS)  # fmt: skip
+
+
+def _honest(off: se2.Array, cov: se2.Array) -> float:
+    """Log density of an offset (3,) of a pose that is known as well as that."""
+    white = np.linalg.solve(np.linalg.cholesky(cov), off)
+    size = float(np.linalg.slogdet(cov)[1])
+    return float(-0.5 * (white @ white + size) - 1.5 * np.log(2.0 * np.pi))
+
+
+def _mistaken(metres: float, turn: float) -> float:
+    """Log density of an offset that somebody did not notice: some metres, any heading."""
+    away = student(np.array([metres / _MISTAKE_M]), 2) - 2.0 * np.log(_MISTAKE_M)
+    return float((away + student(np.array([turn]), 1))[0])
 
 
 def motions(incident: Incident, healed: Healed) -> Iterator[Trial]:
     """Odometry as it was recorded, where it slipped, where it was carried, and all along."""
     if not np.isfinite(incident.odometry).all():
         return
-    kinds: tuple[tuple[bool, FailureKind, str], ...] = (
-        (False, "odometry_slip", "odometry_slip.window"),
-        (True, "kidnapped", "odometry_slip.carried"),
-    )
-    for carried, kind, name in kinds:
-        slips = [s for s in healed.slips if s.is_carried == carried]
-        if slips:
-            yield _slipped(incident, healed, slips, kind, name)
+    if healed.slips:
+        yield from _slipped(incident, healed)
     wheels = incident.case.wheels
     if wheels is not None and wheels.calibration_words:
         told = replace(healed.evidence, odometry=healed.odometry_of(healed.steps_but_slips))
         level = 1.0 if wheels.scale is None else wheels.scale
-        name, words = "odometry_scale.translation", f"{wheels.calibration_words[0]}, which"
+        name, words = "odometry_scale.translation", wheels.calibration_words[0]
         yield Trial(name, "odometry_slip", level, "ratio", None, words, told)
 
 
-def _slipped(
-    incident: Incident, healed: Healed, slips: list[Slip], kind: FailureKind, name: str
-) -> Trial:
+def _slipped(incident: Incident, healed: Healed) -> Iterator[Trial]:
+    """Where odometry and hindsight part: by wheels that slipped, or by hand."""
     steps = healed.steps.copy()
-    for s in slips:
+    for s in healed.slips:
         steps[s.first : s.last] = healed.told_steps[s.first : s.last]
-    worst = max(slips, key=lambda s: s.metres + abs(s.radians))
+    # What began last before the loss has most to do with it.
+    before = [s for s in healed.slips if incident.t_ns[s.first] <= incident.onset_ns]
+    worst = max(before or healed.slips, key=lambda s: s.metres + abs(s.radians))
     since = incident.case.seconds(int(incident.t_ns[worst.first]))
     far = apart(worst.metres, abs(worst.radians))
-    words = f"odometry as recorded from {since} on, {far} otherwise than the robot moved,"
+    words = f"odometry as recorded from {since} on, {far} otherwise than the robot moved"
     told = replace(healed.evidence, odometry=healed.odometry_of(steps))
-    return Trial(name, kind, worst.metres, "m", worst.first, words, told)
-
-
-def _sound(cov: se2.Array) -> se2.Array:
-    if np.isfinite(cov).all() and np.linalg.eigvalsh(cov)[0] >= 0.0 and cov[0, 0] > 0.0:
-        return cov
-    return START_COV
+    odds, row = worst.log_carried, worst.first
+    name = "odometry_slip.window"
+    yield Trial(name, "odometry_slip", worst.metres, "m", row, words, told, log_dose=-odds)
+    yield Trial(name, "kidnapped", worst.metres, "m", row, words, told, log_dose=odds)

@@ -29,7 +29,10 @@ def clocks(incident: Incident, healed: Healed) -> Iterator[Trial]:
     name = "scan_delay.stamp" if delay.seconds > 0 else "tf_delay.odometry"
     told = replace(healed.evidence, odometry=met)
     words = f"stamps as recorded ({delay.text})"
-    yield Trial(name, "timing", abs(delay.seconds), "s", None, words, told)
+    # The verdict asks a belief of late scans for the moment at which they were taken.
+    late_ns = ns(delay.seconds) if delay.seconds > 0.0 and delay.late != "odometry" else 0
+    seconds = abs(delay.seconds)
+    yield Trial(name, "timing", seconds, "s", None, words, told, late_ns=late_ns)
 
 
 def gaps(incident: Incident, healed: Healed) -> Iterator[Trial]:
@@ -67,10 +70,10 @@ def maps(incident: Incident, healed: Healed, offset: ConstantOffset | None) -> I
     old = healed.told_grid
     if changes is not None and not np.array_equal(e.grid.cells, old.cells):
         area = sum(r.area_m2 for r in changes.regions)
-        words = f"the map as the robot had it, {area:.1f} m² of which is no longer true,"
+        words = f"the map as the robot had it, {area:.1f} m² of which is no longer true"
         yield Trial("map_stale.version", "stale_map_use", area, "m2", None, words,
                     replace(e, grid=old))  # fmt: skip
-    if offset is not None and offset.cause != "lookalike":
+    if offset is not None and offset.cause == "map":
         words = f"a map that lies elsewhere ({offset.text})"
         said = se2.compose(np.array(offset.xyyaw), healed.truth)
         size = offset.at_robot_m

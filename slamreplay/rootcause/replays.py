@@ -45,11 +45,13 @@ class Replay:
         xyyaw: (N, 3) its belief at each row.
         sigma_m: (N,) the larger standard deviation of its position, as published.
         updates: how many scans it took in.
+        by_chance: whether a filter made it, whose error is known to a share of it only.
     """
 
     xyyaw: se2.Array
     sigma_m: NDArray[np.float64]
     updates: int
+    by_chance: bool = True
 
 
 def replayed(evidence: Evidence, seed: int) -> Replay:

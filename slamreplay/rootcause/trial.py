@@ -21,7 +21,11 @@ class Trial:
         row: from when on it acts, None for all along.
         words: what was put back, as the beginning of a sentence.
         evidence: with it in; None where the belief follows without a filter.
-        belief: (N, 3) that belief.
+        belief: (N, 3) that belief, which chance has no part in.
+        late_ns: by how much later than measured scans are stamped with it in: what the filter said
+            that much earlier was about the moment of the scan.
+        log_dose: log odds of such a dose with the fault against without it, where that is known.
+        seeds: replays of it, where chance decides what becomes of it.
     """
 
     name: str
@@ -32,3 +36,6 @@ class Trial:
     words: str
     evidence: Evidence | None = None
     belief: se2.Array | None = None
+    late_ns: int = 0
+    log_dose: float = 0.0
+    seeds: int = 3

@@ -1,0 +1,51 @@
+"""From likelihoods to probabilities: a temperature, and what each trial is worth by itself."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from importlib.resources import files
+from types import MappingProxyType
+
+import numpy as np
+
+from slamreplay.rootcause.trying import Tried
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """A conditional logit over what was tried (McFadden, 1974).
+
+    Attributes:
+        slope: of the log likelihood: one over the temperature.
+        bias: what is added to a trial's score, by `key_of`; nats.
+        unplayed: probability of a failure mode that no replay was asked about, by kind.
+    """
+
+    slope: float = 0.5
+    bias: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
+    unplayed: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
+
+    def probabilities(self, tried: Sequence[Tried]) -> list[float]:
+        """Of each trial; they sum to 1."""
+        scores = np.array(
+            [self.slope * t.log_likelihood + self.bias.get(key_of(t), 0.0) for t in tried]
+        )
+        chance = np.exp(scores - scores.max())
+        return (chance / chance.sum()).tolist()
+
+
+def key_of(tried: Tried) -> str:
+    """What a trial is called in the calibration: the kind, and the perturbation if it has one."""
+    trial = tried.trial
+    return f"{trial.kind} {trial.name}".strip()
+
+
+def shipped_calibration() -> Calibration:
+    """The one that this version ships with."""
+    file = files("slamreplay.rootcause").joinpath("calibration.json")
+    if not file.is_file():
+        return Calibration()
+    record = json.loads(file.read_text("utf-8"))
+    return Calibration(record["slope"], record["bias"], record["unplayed"])
