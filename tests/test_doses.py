@@ -13,7 +13,7 @@ from slamreplay.doses.answer import answer
 from slamreplay.doses.carried import carried
 from slamreplay.doses.folder import write_answer
 from slamreplay.doses.metrics import METRICS, limit_of
-from slamreplay.doses.page import critical_rows, notes, results_page
+from slamreplay.doses.page import results_page
 from slamreplay.doses.plan import Dose, Plan, of_levels, of_search
 from slamreplay.errors import BundleError
 from slamreplay.estimators import ESTIMATORS
@@ -22,6 +22,7 @@ from slamreplay.replay import runner
 from slamreplay.replay.dose_file import read_doses
 from slamreplay.replay.dose_ranking import ranking
 from slamreplay.replay.folder import read_runs
+from slamreplay.report.dose_tables import critical_rows, notes
 from slamreplay.testing.synthetic import synthetic_bundle
 
 

@@ -15,11 +15,11 @@ from slamreplay.errors import UsageError
 
 if TYPE_CHECKING:
     from slamreplay.bundle.view import Bundle
-    from slamreplay.doses.page import Rows
     from slamreplay.doses.plan import Plan
     from slamreplay.ingest.options import IngestOptions
     from slamreplay.recipes import DoseRecipe
     from slamreplay.replay.dose import DoseResults
+    from slamreplay.report.dose_tables import Rows
 
 
 def run_design(
@@ -153,7 +153,7 @@ def _simulated(scenario: tuple[str, int], target: Path) -> Bundle:
 
 def _told(results: DoseResults, log: Mapping[str, Any], trials: int) -> str:
     """Question, table, what broke first, and every failed control."""
-    from slamreplay.doses.page import critical_rows, notes, ranking_rows, warning
+    from slamreplay.report.dose_tables import critical_rows, notes, ranking_rows, warning
 
     failed = [warning(c) for c in results.controls if c.passed is False]
     scenario = log["scenario"]
