@@ -107,7 +107,8 @@ class Seen:
     def _near(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """Scan and number of every beam that came back from nearby."""
         near = (self.measured > _NEAR_M) & (self.measured < _FAR_M)
-        return np.nonzero(near & np.isfinite(self.laser[:, :1]))
+        scan, beam = np.nonzero(near & np.isfinite(self.laser[:, :1]))
+        return scan, beam
 
     def _along(
         self, scan: NDArray[np.int64], beam: NDArray[np.int64], part: se2.Array
