@@ -263,6 +263,19 @@ def test_what_is_not_there_cannot_be_changed():
             perturbed(text, 0.5, still)
 
 
+def test_a_robot_that_stands_neither_slips_nor_scatters():
+    table, transforms = BUNDLE.table("odometry"), BUNDLE.table("transforms")
+    still = table.replace(
+        position_xyz=np.zeros_like(table["position_xyz"]),
+        orientation_xyzw=np.tile([0.0, 0.0, 0.0, 1.0], (len(table), 1)),
+    )
+    view = without_tf(BUNDLE.view().with_table(transforms)).with_table(still)
+    for text, level in CHANGED:
+        if not text.startswith("odometry_scale"):
+            with pytest.raises(NotApplicableError, match="does not|drives 0 m"):
+                perturbed(text, level, view)
+
+
 def test_two_ways_about_a_third_frame_are_no_odometry_that_could_be_changed():
     transforms = BUNDLE.table("transforms")
     parent, child = transforms["parent_frame"].copy(), transforms["child_frame"].copy()
