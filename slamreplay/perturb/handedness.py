@@ -74,8 +74,9 @@ class Handedness:
 
     def _scans(self, view: BundleView) -> BundleView:
         beams = scan_beams(view, self.name)
-        last = np.repeat(beams.lengths, beams.lengths) - 1
-        return beams.with_ranges(beams.ranges_m[np.arange(len(last)) + last - 2 * beams.index])
+        ragged = beams.table["ranges_m"]
+        ends = np.repeat(ragged.offsets[:-1] + ragged.offsets[1:] - 1, ragged.lengths)
+        return beams.with_ranges(beams.ranges_m[ends - np.arange(len(ends))])
 
     def _inertial(self, view: BundleView) -> BundleView:
         unit = inertial(view, self.name)
