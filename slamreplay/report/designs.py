@@ -8,6 +8,7 @@ from slamreplay.report.dose_tables import (
     control_rows,
     level_text,
     notes,
+    nothing,
     panel_of,
     ranking_rows,
     words_of,
@@ -55,7 +56,7 @@ def design_table(results: DoseResults | None) -> Table:
                 _value(first.values.get(metric)),
                 Cell(_value(last.values.get(metric)), f"at {last.level:g} {curve.unit}"),
                 Cell(_took(curve), _interval(curve.critical[0])),
-                curve.broke_first or "nothing",
+                curve.broke_first or nothing(curve),
             ]
         )
     return table(head, rows, "doses.json of the runs")
@@ -66,7 +67,8 @@ def ranking_table(results: DoseResults | None) -> Table:
     head = ("estimator", "what was changed", "broke first", "at", "share of the range tried")
     if results is None or len(results.curves) < 2:
         return table(head, [])
-    rows = [[*row[:2], _title(row[2], results), *row[3:]] for row in ranking_rows(results)[1:]]
+    titles = {limit.metric: limit.title for limit in results.limits}
+    rows = [[*row[:2], titles.get(row[2], row[2]), *row[3:]] for row in ranking_rows(results)[1:]]
     return table(head, rows, "doses.json of the runs")
 
 
@@ -171,8 +173,3 @@ def _value(values: tuple[float | None, ...] | None) -> str:
     """The middle one of the seeds'."""
     known = sorted(v for v in values or () if v is not None)
     return short(known[len(known) // 2]) if known else short(None)
-
-
-def _title(metric: str | None, results: DoseResults) -> str:
-    titles = {limit.metric: limit.title for limit in results.limits}
-    return "nothing" if metric is None else titles.get(metric, metric)
