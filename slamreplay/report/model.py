@@ -380,7 +380,7 @@ class UsagePart(_Strict):
     what a correction's age is made of. `unknown_*` is how the robot moved within `pose_s`.
     """
 
-    name: Literal["controller", "planner", "recoveries"]
+    name: Literal["controller", "planner", "goals", "recoveries"]
     topic: Text | None
     uses: Ns
     rate_hz: Number
