@@ -136,7 +136,7 @@ def test_kinds_of_the_verdicts_benchmark_are_as_they_were():
 
 def test_lost_in_a_changed_hall_has_two_right_answers():
     standing = warehouse().changed(without=("rack a2",))
-    one = made("lost_in_changed", story(believed_start=FAR, standing=standing))
+    one = made("lost_in_changed", replace(story(believed_start=FAR), standing=standing))
     known = known_cause(one, FakeTruth("lost_and_map_changed"))
 
     assert known.accepted == ("wrong_initial_pose", "stale_map_use")
