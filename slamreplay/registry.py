@@ -45,8 +45,8 @@ class Registry:
     def __contains__(self, name: object) -> bool:
         return name in self.targets()
 
-    def load(self, name: str) -> Any:
-        """The object registered under `name`.
+    def target(self, name: str) -> str:
+        """Where `name` is loaded from, as "module:attribute"; nothing is imported.
 
         Raises:
             UsageError: nothing has that name; the hint holds the nearest one.
@@ -54,5 +54,13 @@ class Registry:
         targets = self.targets()
         if name not in targets:
             raise UsageError(f"there is no {self.kind} '{name}'", hint=nearest(name, targets))
-        module, _, attribute = targets[name].partition(":")
+        return targets[name]
+
+    def load(self, name: str) -> Any:
+        """The object registered under `name`.
+
+        Raises:
+            UsageError: nothing has that name; the hint holds the nearest one.
+        """
+        module, _, attribute = self.target(name).partition(":")
         return getattr(import_module(module), attribute)

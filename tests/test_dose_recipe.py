@@ -113,7 +113,11 @@ HOSTILE = {
     "module": ("tf_delay,", "os:system,", "there is no perturbation 'os:system'"),
     "estimator": ("[amcl,", "[acml,", "did you mean 'amcl'?"),
     "estimator twice": ("[amcl, pose_graph]", "[amcl, amcl]", "an estimator is named twice"),
-    "recorded": ("[amcl,", "[recorded,", "cannot be run again"),
+    "switch": ("tf_delay, levels_s: [0.4, 0.05, 0.1, 0.2]",
+               "initial_pose.global, levels_ratio: [0.5]", "it is off or on"),
+    "search of a switch": ("scan_drop.random, search_ratio: {from: 0.0, to: 0.99,",
+                           "initial_pose.global, search_ratio: {from: 0.0, to: 1,",
+                           "initial_pose.global is off or on (hint: write levels_ratio: [1])"),
     "no estimator": ("[amcl, pose_graph]", "[]", "at least 1 item"),
     "metric": ("error_max_m:", "eror_max_m:", "did you mean 'error_max_m'?"),
     "metric without unit": ("error_max_m:", "error_max:", "did you mean 'error_max_m'?"),
@@ -150,7 +154,7 @@ def test_what_is_no_design_gets_one_clear_line(name, tmp_path):
     assert str(tmp_path) in line
     assert said in line
     assert line.isprintable()
-    assert len(line) < len(str(tmp_path)) + 400
+    assert len(line) < len(str(tmp_path)) + 900  # all perturbations by name
 
 
 def test_too_many_trials_in_all_are_counted_before_any_is_run(tmp_path):

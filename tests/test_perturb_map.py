@@ -269,3 +269,11 @@ def test_edits_of_cells():
     np.testing.assert_array_equal(drawn, wall - [5, 0])
     assert (there.cells[25, 10:15] == 100).all()
     assert not len(with_walls_moved(grid, wall, [100.0, 0.0])[1])
+
+
+def test_a_belief_of_another_map_is_not_asked_where_the_robot_was():
+    elsewhere = synthetic_bundle(seconds=24.0, belief_offset_xyyaw=(0.0, 60.0, 1.0)).view()
+
+    cells, _ = changed(elsewhere, "appeared", 1.0)
+
+    assert cells.any()

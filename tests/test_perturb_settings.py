@@ -5,6 +5,7 @@ import pytest
 
 from slamreplay.bundle.run import Run, Trial, run_bytes
 from slamreplay.bundle.tables import Table
+from slamreplay.consistency.evidence.references import references_of
 from slamreplay.errors import NotApplicableError, UsageError
 from slamreplay.estimators import ESTIMATORS, RECORDED
 from slamreplay.estimators.amcl.config import AmclConfig
@@ -15,6 +16,7 @@ from slamreplay.geometry import se2
 from slamreplay.perturb import PERTURBATIONS
 from slamreplay.replay.one_trial import run_trial
 from slamreplay.replay.reported import REPORTED
+from slamreplay.report.metrics import asked_of, nees_metrics
 from slamreplay.testing.synthetic import synthetic_bundle
 
 BUNDLE = synthetic_bundle(seconds=4.0, with_tags=True)
@@ -109,6 +111,15 @@ def test_a_scaled_covariance_changes_that_of_every_pose_and_nothing_else():
         np.testing.assert_array_equal(told.track.cov, 4.0 * plain.track.cov)
         one, two = told.innovations[0], plain.innovations[0]
         np.testing.assert_array_equal(one.moved, two.moved)
+
+
+@pytest.mark.parametrize("estimator", ["dead_reckoning", "recorded"])
+def test_nees_sees_a_scaled_covariance(estimator):
+    def mean(*trial):
+        asked = asked_of(run(estimator, *trial), references_of(BUNDLE, None), BUNDLE.view())
+        return nees_metrics(asked)["nees_mean"]
+
+    assert mean("pose_covariance_scale.covariance", 0.1) == pytest.approx(10.0 * mean(), rel=0.03)
 
 
 @pytest.mark.parametrize(

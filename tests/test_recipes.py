@@ -16,7 +16,7 @@ from PIL import Image
 
 from slamreplay.errors import UsageError
 from slamreplay.labs import LABS
-from slamreplay.recipes import read_recipe
+from slamreplay.recipes import DoseRecipe, read_recipe
 
 ROOT = Path(__file__).resolve().parents[1]
 RECIPES = sorted(path for path in (ROOT / "recipes").iterdir() if path.is_dir())
@@ -101,7 +101,8 @@ def test_readme_names_question_command_and_pictures(recipe, answered):
     shown = [line.split("](")[1].rstrip(")") for line in page.splitlines() if line[:2] == "!["]
 
     assert read_recipe(recipe / "recipe.yaml").question in page
-    assert f"slamreplay perturb --recipe recipes/{recipe.name}/recipe.yaml -o " in page
+    command = f"--recipe recipes/{recipe.name}/recipe.yaml -o "
+    assert any(f"slamreplay perturb {log}{command}" in page for log in ("", "LOG "))
     assert shown
     for name in shown:
         ours, now = (
@@ -124,11 +125,35 @@ def is_smaller(golden, full):
     return golden == full or (type(full) is int and 0 < golden < full)
 
 
+def is_part(golden, full):
+    """Whether a golden design asks the same with fewer seeds, estimators, perturbations, levels."""
+    axes = {(axis.perturbation, axis.side): axis for axis in full.axes}
+    return (
+        (golden.question, golden.limits) == (full.question, full.limits)
+        and golden.positive_control == full.positive_control
+        and golden.seeds == full.seeds[: len(golden.seeds)]
+        and set(golden.estimators) <= set(full.estimators)
+        and all(
+            (axis.perturbation, axis.side) in axes
+            and abs(axis.levels[-1] - axis.baseline)
+            <= abs(axes[axis.perturbation, axis.side].levels[-1] - axis.baseline)
+            for axis in golden.axes
+        )
+    )
+
+
 @pytest.mark.parametrize("recipe", RECIPES, ids=lambda path: path.name)
 def test_a_golden_recipe_asks_the_same(recipe):
     full, golden = (read_recipe(path) for path in (recipe / "recipe.yaml", replayed(recipe)))
 
-    assert (full.question, full.lab, full.seed) == (golden.question, golden.lab, golden.seed)
+    assert type(full) is type(golden)
+    if isinstance(full, DoseRecipe):
+        assert golden.scenario is not None  # a test has no log of its own
+        assert full.scenario in (None, golden.scenario)
+        assert is_part(golden.plan, full.plan)
+        return
+    for name in ("question", "lab", "scenario", "seed"):
+        assert getattr(full, name, None) == getattr(golden, name, None)
     assert is_smaller(golden.parameters.model_dump(), full.parameters.model_dump())
 
 
@@ -221,7 +246,7 @@ HOSTILE = {
     "lab misspelt": (SMALL.replace("covariance_breathing", "covariance_breathin"), "did you mean"),
     "lab elsewhere": (SMALL.replace("lab: covariance_breathing", "lab: os:system"), "no lab"),
     "key of lab misspelt": (SMALL.replace("lab:", "labb:"), "did you mean 'lab'?"),
-    "no lab": ("version: 1\n", "the key 'lab' or 'perturbations' is missing"),
+    "no lab": ("version: 1\n", "the key 'lab', 'perturbations' or 'budget' is missing"),
     "key": (SMALL.replace("step_m:", "stp_m:", 1), "'parameters.stp_m' (hint"),
     "parameter": (SMALL.replace("range_sigma_m:", "range_sigma:"), "mean 'range_sigma_m'?"),
     "nested": (SMALL.replace("grows_from_ratio", "grows_ratio"), "mean 'grows_from_ratio'?"),

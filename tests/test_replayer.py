@@ -60,7 +60,7 @@ def test_a_killed_worker_is_replaced_and_its_trial_done(bundle, monkeypatch):
                 victims.append(replayer._workers.pids[0])
                 os.kill(victims[0], signal.SIGKILL)
 
-        replayer._tell = kill_one
+        replayer._progress = kill_one
         runs = replayer.replay(trials)
 
     assert [r.trial for r in runs] == trials
@@ -78,7 +78,7 @@ def test_a_trial_whose_workers_are_killed_again_is_told_in_one_line(bundle, tmp_
                 if worker.trial == deadly:
                     worker.process.kill()
 
-        replayer._tell = kill
+        replayer._progress = kill
         baseline, lost = replayer.replay(trials)
 
     assert baseline.estimate is not None
@@ -97,7 +97,7 @@ def test_workers_end_when_their_parent_is_killed_and_what_is_done_stays(bundle, 
         "texts = [f'tf_delay={k / 1000}' for k in range(1, 400)]\n"
         "trials = design(bundle, ['dead_reckoning'], texts, 3)\n"
         "r = Replayer(bundle, cache=Path(sys.argv[2]), workers=2)\n"
-        "r._tell = lambda words, share: print(json.dumps(r._workers.pids), flush=True)\n"
+        "r._progress = lambda words, share: print(json.dumps(r._workers.pids), flush=True)\n"
         "r.replay(trials)\n"
     )
     command = [sys.executable, "-c", script, str(bundle.path), str(tmp_path)]
@@ -119,7 +119,7 @@ def test_workers_end_when_their_parent_is_killed_and_what_is_done_stays(bundle, 
     some = trials_of(bundle, *texts[:8])
     with Replayer(bundle, cache=tmp_path) as replayer:
         computed = []
-        replayer._tell = lambda words, share: computed.append(words)
+        replayer._progress = lambda words, share: computed.append(words)
         runs = replayer.replay(some)
     assert all(r.estimate is not None for r in runs)
     after = {file.name: file.stat().st_mtime_ns for file in tmp_path.glob("*.npz")}

@@ -159,7 +159,7 @@ def read_table(path: Path, manifest: Manifest, name: str) -> Table:
     file = path / "tables" / f"{name}.parquet"
     _check(file, manifest, name)
     try:
-        return Table.from_arrow(TABLES[name], pq.read_table(file, memory_map=False))
+        return Table.from_arrow(TABLES[name], _arrow(file))
     except pa.ArrowException as error:
         raise BundleError(f"not a readable Parquet file: {error}", where=file) from error
 
@@ -173,9 +173,15 @@ def read_columns(path: Path, manifest: Manifest, name: str, columns: Sequence[st
     file = path / "tables" / f"{name}.parquet"
     _check(file, manifest, name)
     try:
-        return pq.read_table(file, columns=list(columns), memory_map=False)
+        return _arrow(file, list(columns))
     except pa.ArrowException as error:
         raise BundleError(f"not a readable Parquet file: {error}", where=file) from error
+
+
+def _arrow(file: Path, columns: list[str] | None = None) -> pa.Table:
+    """The table in one file; `parquet.read_table`, made for many, would load pandas first."""
+    with pq.ParquetFile(file, memory_map=False) as stored:
+        return stored.read(columns)
 
 
 def read_grid(path: Path, entry: MapVersion) -> OccupancyGrid:

@@ -53,13 +53,14 @@ def run_design(
         UsageError: no log and no scenario, or a name that there is not.
     """
     from slamreplay.bundle.atomic import check_target
-    from slamreplay.cli.main import cache_folder
+    from slamreplay.cli.main import cache_folder, watch_folder
     from slamreplay.cli.progress import progress_bar
     from slamreplay.doses.answer import answer
     from slamreplay.doses.folder import write_answer
     from slamreplay.doses.page import results_json
     from slamreplay.replay.folder import RUNS
     from slamreplay.replay.parameters import Configuration, read_parameters
+    from slamreplay.replay.watch import watched
 
     plan = _overridden(recipe.plan, estimators, seed)
     check_target(output, RUNS)
@@ -68,10 +69,13 @@ def run_design(
         given = read_parameters(parameters, list(plan.estimators), robot)
     for line in given.told:
         typer.echo(line, err=True)
-    with _evidence(recipe, path, logs, how) as (bundle, is_kept):
+    with (
+        watched(watch_folder(), output) as watch,
+        _evidence(recipe, path, logs, how) as (bundle, is_kept),
+    ):
         with progress_bar("replaying") as progress:
             found = answer(bundle, plan, parameters=given.of, cache=cache_folder(),
-                           progress=progress)  # fmt: skip
+                           progress=progress, watch=watch)  # fmt: skip
         log: dict[str, Any] = {"bundle_id": bundle.manifest.bundle_id, "scenario": None}
         if not logs and recipe.scenario is not None:
             log["scenario"] = dict(zip(("name", "seed"), recipe.scenario, strict=True))
@@ -104,10 +108,11 @@ def _evidence(
 ) -> Iterator[tuple[Bundle, bool]]:
     """The bundle, and whether it stays where it is after the block."""
     from slamreplay.cli import options
+    from slamreplay.cli.main import bundle_folder
     from slamreplay.ingest.options import IngestOptions
 
     if logs:
-        with options.evidence(logs, how) as bundle:
+        with options.evidence(logs, how, cache=bundle_folder()) as bundle:
             yield bundle, bundle.path is not None and bundle.path.resolve() == logs[0].resolve()
         return
     if recipe.scenario is None:
@@ -119,16 +124,31 @@ def _evidence(
             where=path,
             hint="leave them out, or name a LOG",
         )
+    from slamreplay.errors import OutputError
+    from slamreplay.ingest.bundle_cache import made_once
+
+    scenario = recipe.scenario
+    asked = [f"scenario {scenario}"]
+    try:
+        bundle = made_once(bundle_folder(), asked, lambda target: _simulated(scenario, target))
+    except (OSError, OutputError):  # a cache that cannot be written is not used
+        with TemporaryDirectory(prefix="slamreplay-") as folder:
+            yield _simulated(scenario, Path(folder) / "log.bundle"), False
+        return
+    yield bundle, False
+
+
+def _simulated(scenario: tuple[str, int], target: Path) -> Bundle:
+    """The bundle of a scenario with a seed, written to `target`."""
     from slamreplay.cli.progress import progress_bar
+    from slamreplay.ingest.pipeline import ingest
     from slamreplay.simulate.pipeline import simulate
 
-    name, seed = recipe.scenario
-    with TemporaryDirectory(prefix="slamreplay-") as folder:
+    name, seed = scenario
+    with TemporaryDirectory(prefix="slamreplay-") as folder, progress_bar("simulating"):
         log = Path(folder) / f"{name}.mcap"
-        with progress_bar("simulating"):
-            simulate(name, log, seed=seed)
-        with options.evidence([log], how) as bundle:
-            yield bundle, False
+        simulate(name, log, seed=seed)
+        return ingest([log], target)
 
 
 def _told(results: DoseResults, log: Mapping[str, Any], trials: int) -> str:

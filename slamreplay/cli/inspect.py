@@ -1,4 +1,4 @@
-"""slamreplay inspect: what a bundle or log holds, what it lacks, and what that costs."""
+"""slamreplay inspect: what a bundle or log holds, what it lacks, and how far its trials are."""
 
 from __future__ import annotations
 
@@ -29,12 +29,24 @@ def inspect(
     end: o.End = None,
     json: o.Json = False,
 ) -> None:
-    """Show what is in a bundle or log, what is missing, and whether its clocks and tf hold."""
-    from slamreplay.consistency.audits.inspection import inspect as look
+    """Show what is in a bundle or log, what is missing, and whether its clocks and tf hold.
+
+    Of a folder of runs, also while perturb makes it or after that was interrupted: which trials are
+    done, running and waiting, the time left, and the numbers so far.
+    """
+    from slamreplay.cli.inspect_runs import answers_of, show_runs
+    from slamreplay.ingest.options import IngestOptions
 
     given = o.ingest_options(
         map_yaml=map_yaml, topics=topics, robot=robot, reference=reference, start_s=start, end_s=end
     )
+    if len(logs) == 1 and given == IngestOptions():
+        runs = answers_of(logs[0])
+        if runs is not None:
+            show_runs(runs, as_json=json)
+            return
+    from slamreplay.consistency.audits.inspection import inspect as look
+
     with o.evidence(logs, given) as bundle:
         show(look(bundle), as_json=json)
 

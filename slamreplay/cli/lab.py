@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import typer
 
 from slamreplay.errors import UsageError
 
 if TYPE_CHECKING:
-    from slamreplay.labs.lab import ResultTable
+    from slamreplay.labs.lab import LabResults, ResultTable
     from slamreplay.recipes import LabRecipe
 
 
@@ -38,7 +38,7 @@ def run_lab(
         UsageError: a log given to a lab, or a seed that is none.
     """
     from slamreplay.cli.progress import progress_bar
-    from slamreplay.labs.folder import check_results_target, results_json, write_results
+    from slamreplay.labs.folder import check_results_target, write_results
 
     if given:
         raise UsageError(
@@ -59,10 +59,17 @@ def run_lab(
         "parameters": recipe.parameters.model_dump(mode="json"),
     }
     write_results(output, head, results)
+    show(head, results, output, as_json=as_json)
+
+
+def show(head: dict[str, Any], results: LabResults, output: Path, *, as_json: bool) -> None:
+    """Print what was written to a folder: the tables, or the results as JSON."""
+    from slamreplay.labs.folder import results_json
+
     if as_json:
         typer.echo(results_json(head, results), nl=False)
         return
-    typer.echo(recipe.question)
+    typer.echo(head["question"])
     for table in results.tables:
         typer.echo(f"\n{table.title}\n{_text(table)}")
     typer.echo(f"\nresults written to {output}", err=True)

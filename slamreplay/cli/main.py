@@ -118,5 +118,20 @@ def cache_folder() -> Path:
         return Path(tempfile.gettempdir()) / "slamreplay"
 
 
+def run_folder() -> Path:
+    """Where runs are kept by the hash of all they depend on."""
+    return cache_folder() / "runs"
+
+
+def bundle_folder() -> Path:
+    """Where bundles of raw logs are kept for the commands that ask more than once."""
+    return cache_folder() / "bundles"
+
+
+def watch_folder() -> Path:
+    """Where `perturb` tells how far it is, and `inspect` looks."""
+    return cache_folder() / "watch"
+
+
 if __name__ == "__main__":
     main()

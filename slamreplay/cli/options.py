@@ -97,7 +97,6 @@ def evidence(
     from slamreplay.bundle.view import Bundle
     from slamreplay.cli.progress import progress_bar
     from slamreplay.ingest.options import IngestOptions
-    from slamreplay.ingest.pipeline import ingest
 
     if len(logs) == 1 and is_bundle(logs[0]):
         if options != IngestOptions():
@@ -113,6 +112,8 @@ def evidence(
         if found is not None:
             yield found
             return
+    from slamreplay.ingest.pipeline import ingest
+
     with TemporaryDirectory(prefix="slamreplay-") as folder:
         with progress_bar("reading") as progress:
             bundle = ingest(logs, keep or Path(folder) / "log.bundle", options, progress=progress)

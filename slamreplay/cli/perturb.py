@@ -103,19 +103,29 @@ def perturb(
 
     The table shows how far each run is from the undisturbed run of the same estimator. A recipe
     that is a design says which levels of which perturbations are tried, or searches for the level
-    at which an estimator breaks; its answer lies beside the runs. One that is a lab simulates what
-    it needs, takes no LOG and writes its answer to the folder.
+    at which an estimator breaks; its answer lies beside the runs. One that is a budget asks how old
+    poses were in the LOG, or in the scenario it names; one that is a lab simulates what it needs
+    and takes no LOG. Both write their answer to the folder.
     """
+    how = options.ingest_options(
+        map_yaml=map_yaml,
+        topics=topics,
+        robot=robot,
+        reference=reference,
+        start_s=start_s,
+        end_s=end_s,
+    )
     if recipe is not None:
         from slamreplay.cli.lab import run_lab
-        from slamreplay.recipes import LabRecipe, read_recipe
+        from slamreplay.recipes import BudgetRecipe, LabRecipe, read_recipe
 
         asked = read_recipe(recipe)
-        only_logs = {
-            "LOG": logs,
+        of_runs: dict[str, object] = {
             "--perturbation": perturbations,
             "--estimator": estimators,
             "--parameters": parameters,
+        }
+        of_logs: dict[str, object] = {
             "--map": map_yaml,
             "--topics": topics,
             "--robot": robot,
@@ -123,9 +133,18 @@ def perturb(
             "--start": start_s,
             "--end": end_s,
         }
-        foreign = [name for name, value in only_logs.items() if value not in (None, [])]
+        is_lab = isinstance(asked, LabRecipe)
+        foreign = {"LOG": logs, **of_runs, **of_logs} if is_lab else of_runs
+        names = [name for name, value in foreign.items() if value not in (None, [])]
         if isinstance(asked, LabRecipe):
-            run_lab(asked, recipe, output, seed=seed, given=foreign, as_json=as_json)
+            run_lab(asked, recipe, output, seed=seed, given=names, as_json=as_json)
+            return
+        if isinstance(asked, BudgetRecipe):
+            from slamreplay.cli.budget import run_budget
+
+            run_budget(
+                asked, recipe, logs or (), how, output, seed=seed, given=names, as_json=as_json
+            )
             return
         from slamreplay.cli.dose import run_design
 
@@ -137,14 +156,7 @@ def perturb(
             recipe,
             output,
             logs=logs or (),
-            how=options.ingest_options(
-                map_yaml=map_yaml,
-                topics=topics,
-                robot=robot,
-                reference=reference,
-                start_s=start_s,
-                end_s=end_s,
-            ),
+            how=how,
             estimators=estimators or (),
             parameters=parameters or (),
             robot=robot,
@@ -155,7 +167,7 @@ def perturb(
     if not logs:
         raise UsageError("there is no LOG to replay", hint="name one, or a lab with --recipe")
     from slamreplay.bundle.atomic import check_target
-    from slamreplay.cli.main import cache_folder
+    from slamreplay.cli.main import bundle_folder, run_folder, watch_folder
     from slamreplay.cli.progress import progress_bar
     from slamreplay.consistency.evidence.references import references_of
     from slamreplay.estimators import ESTIMATORS
@@ -163,7 +175,8 @@ def perturb(
     from slamreplay.replay.folder import RUNS, write_runs
     from slamreplay.replay.metrics import trial_metrics
     from slamreplay.replay.parameters import Configuration, read_parameters
-    from slamreplay.replay.runner import replay
+    from slamreplay.replay.runner import Replayer
+    from slamreplay.replay.watch import watched
     from slamreplay.report.metrics import asked_of, nees_metrics
 
     check_target(output, RUNS)
@@ -171,23 +184,21 @@ def perturb(
         parse_perturbation(text)
     chosen = estimators or list(ESTIMATORS)
     for name in chosen:
-        ESTIMATORS.load(name)
+        ESTIMATORS.target(name)
     given = read_parameters(parameters, chosen, robot) if parameters else Configuration({}, ())
     for line in given.told:
         typer.echo(line, err=True)
-    how = options.ingest_options(
-        map_yaml=map_yaml,
-        topics=topics,
-        robot=robot,
-        reference=reference,
-        start_s=start_s,
-        end_s=end_s,
-    )
-    with options.evidence(logs, how, cache=cache_folder() / "bundles") as bundle:
+    with (
+        watched(watch_folder(), output) as watch,
+        options.evidence(logs, how, cache=bundle_folder()) as bundle,
+    ):
         names = estimators or usual_estimators(bundle)
         trials = design(bundle, names, perturbations or (), seed or 0, given.of)
-        with progress_bar("replaying") as progress:
-            runs = replay(bundle, trials, progress=progress, cache=cache_folder() / "runs")
+        with (
+            progress_bar("replaying") as progress,
+            Replayer(bundle, progress=progress, cache=run_folder(), watch=watch) as replayer,
+        ):
+            runs = replayer.replay(trials)
         is_raw = bundle.path is None or bundle.path.resolve() != logs[0].resolve()
         write_runs(output, bundle, runs, keep_bundle=is_raw)
         view, references = bundle.view(), references_of(bundle, None)

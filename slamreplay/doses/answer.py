@@ -17,6 +17,8 @@ from slamreplay.doses.plan import Axis, Plan
 from slamreplay.doses.search import next_levels
 from slamreplay.doses.trials import Trials
 from slamreplay.replay.dose import Control, DoseCurve, DoseResults
+from slamreplay.replay.runner import Replayer
+from slamreplay.replay.watch import Watch
 
 Progress = Callable[[str, float], None]
 
@@ -63,6 +65,7 @@ def answer(
     cache: Path | None = None,
     workers: int | None = None,
     progress: Progress | None = None,
+    watch: Watch | None = None,
 ) -> Answer:
     """Replay what a design asks for, measure it, and say what broke first.
 
@@ -76,13 +79,19 @@ def answer(
         cache: folder of what was computed earlier: runs and hindsight.
         workers: processes that share the trials, one per core by default.
         progress: told what is being done, and the share done.
+        watch: told where every trial stands, for whoever looks on.
 
     Raises:
         UsageError: a trial names what does not exist, or a level that a perturbation refuses.
     """
     runs = None if cache is None else cache / "runs"
     judges = Judges(bundle, None if cache is None else cache / "hindsight", progress)
-    trials = Trials(bundle, parameters, plan.seeds[0], judges, runs, workers)
+    with Replayer(bundle, cache=runs, workers=workers, watch=watch) as replayer:
+        trials = Trials(bundle, parameters, plan.seeds[0], judges, replayer)
+        return _answered(bundle, plan, trials, progress)
+
+
+def _answered(bundle: Bundle, plan: Plan, trials: Trials, progress: Progress | None) -> Answer:
     trials.ask((trials.baseline(e, s) for e in plan.estimators for s in plan.seeds[:2]), progress)
     pairs = _pairs(bundle, plan, trials)
     levels: dict[_Pair, dict[float, None]] = {pair: {} for pair in pairs}

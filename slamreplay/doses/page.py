@@ -58,7 +58,7 @@ def results_page(results: DoseResults, figures: Sequence[str]) -> str:
     lines = [f"# {results.question}", ""]
     for title, rows in tables(results):
         lines += [f"## {title}", "", *_markdown(rows), ""]
-    lines += [f"- {note}" for note in (*notes(results), *METHOD)] + [""]
+    lines += [*(f"- {note}" for note in notes(results)), METHOD]
     lines += [f"![{name}]({name}.png)" for name in figures]
     return "\n".join(lines) + "\n"
 
@@ -133,19 +133,13 @@ def notes(results: DoseResults) -> list[str]:
 
 
 #: What holds for every design.
-METHOD = (
-    (
-        "A critical level is the least level tried at which half of the seeds or more had crossed. "
-        "Its interval is that of the median over seeds, between order statistics of the levels "
-        "that held and of those that broke, with the confidence told; below six seeds 95 % cannot "
-        "be had."
-    ),
-    "Differences are those of one seed with and without; the interval of their mean is Student's.",
-    (
-        "Shares of the range tried compare levels of different units only as far as the ranges of "
-        "the recipe do."
-    ),
-)
+METHOD = """\
+- A critical level is the least level tried at which half of the seeds or more had crossed. Its
+  interval is that of the median over seeds, between order statistics of the levels that held and of
+  those that broke, with the confidence told; below six seeds 95 % cannot be had.
+- Differences are those of one seed with and without; the interval of their mean is Student's.
+- Shares of the range tried compare levels of different units only as far as the recipe's ranges do.
+"""
 
 
 def warning(control: Control) -> str:

@@ -150,6 +150,9 @@ def of_search(name: str, first: float, last: float, tolerance: float) -> Axis:
             from the baseline, or a tolerance that takes too many rounds.
     """
     name, unit, baseline = variant_of(name, (first, last))
+    short, _, variant = name.partition(".")
+    if PERTURBATIONS.load(short).variants[variant].is_switch:
+        raise UsageError(f"{name} is off or on", hint=f"write levels_{unit}: [1]")
     near, far = first - baseline, last - baseline
     if near * far < 0.0 or abs(far) <= abs(near):
         raise UsageError(

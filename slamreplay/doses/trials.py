@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
-from pathlib import Path
 
 from slamreplay.bundle.odometry import odometry_track
 from slamreplay.bundle.run import Run, Trial, run_bytes
@@ -14,7 +13,7 @@ from slamreplay.consistency.evidence.source import Reference
 from slamreplay.doses.judge import BASELINE, Judges
 from slamreplay.doses.measure import Measured, measured
 from slamreplay.doses.plan import Dose
-from slamreplay.replay.runner import replay
+from slamreplay.replay.runner import Replayer
 
 Progress = Callable[[str, float], None]
 
@@ -30,8 +29,7 @@ class Trials:
         parameters: canonical JSON by estimator, for those that do not run with their defaults.
         first_seed: whose runs are kept.
         judges: of the log.
-        cache: folder of earlier runs.
-        workers: processes that share the trials, one per core by default.
+        replayer: of the log; it does every round.
     """
 
     def __init__(
@@ -40,12 +38,11 @@ class Trials:
         parameters: Mapping[str, str],
         first_seed: int,
         judges: Judges,
-        cache: Path | None,
-        workers: int | None,
+        replayer: Replayer,
     ) -> None:
         self._bundle, self._parameters = bundle, parameters
         self._first_seed, self._judges = first_seed, judges
-        self._cache, self._workers = cache, workers
+        self._replayer = replayer
         self._view = bundle.view()
         self._odometry = odometry_track(self._view)
         self._judge_of: dict[str, Reference | None] = {}
@@ -69,15 +66,16 @@ class Trials:
 
         A trial is held against the baseline of its seed, which is known or among them; where it is
         neither, all baselines are the same and the first seed's stands for it.
+
+        Args:
+            trials: of this log.
+            progress: told what is being done, and the share done.
         """
         fresh = [trial for trial in dict.fromkeys(trials) if trial not in self._numbers]
         fresh.sort(key=lambda trial: trial.perturbation is not None)
-        runs: Sequence[Run] = ()
         if fresh:
-            runs = replay(self._bundle, fresh, progress=progress, cache=self._cache,
-                          workers=self._workers)  # fmt: skip
-        for run in runs:
-            self._take(run)
+            for run in self._replayer.replay(fresh, progress=progress):
+                self._take(run)
 
     def _take(self, run: Run) -> None:
         trial = run.trial

@@ -6,7 +6,7 @@ import hashlib
 import os
 import shutil
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import fields
 from pathlib import Path
 
@@ -18,8 +18,6 @@ from slamreplay.bundle.store import MANIFEST, is_bundle
 from slamreplay.bundle.view import Bundle
 from slamreplay.errors import BundleError, MapError
 from slamreplay.ingest.options import IngestOptions
-from slamreplay.ingest.pipeline import ingest
-from slamreplay.maps.map_server import read_map
 
 #: Bundles beyond so many bytes go, the least recently used first, but none of the last hour.
 MOST_BYTES = 4_000_000_000
@@ -44,37 +42,57 @@ def ingest_once(
     Raises:
         SlamreplayError: as of `ingest`; of the kind `OutputError` where the cache takes no bundle.
     """
-    target = cache / _key(logs, options)
+
+    def read(target: Path) -> Bundle:
+        from slamreplay.ingest.pipeline import ingest  # of no use where the bundle is there
+
+        return ingest(logs, target, options, progress=progress)
+
+    return made_once(cache, _lines(logs, options), read)
+
+
+def made_once(cache: Path, told: Iterable[str], make: Callable[[Path], Bundle]) -> Bundle:
+    """A bundle from a folder of them, made where it is not there or damaged.
+
+    Args:
+        cache: folder of bundles.
+        told: lines that say all that the bundle depends on, beside this program.
+        make: writes it into the folder that it is given.
+    """
+    target = cache / _key(told)
     if is_bundle(target):
         try:
             found = Bundle.open(target)
         except BundleError:
-            pass  # damaged: ingest replaces it
+            pass  # damaged: it is replaced
         else:
             os.utime(target / MANIFEST)
             return found
-    bundle = ingest(logs, target, options, progress=progress)
+    bundle = make(target)
     _trim(cache, keep=target)
     return bundle
 
 
-def _key(logs: Sequence[Path], options: IngestOptions) -> str:
-    digest = hashlib.sha256(f"{np.__version__} {pa.__version__}".encode())
+def _key(told: Iterable[str]) -> str:
+    digest = hashlib.sha256(f"{np.__version__} {pa.__version__}\n".encode())
     root = Path(slamreplay.__file__).parent
     for file in sorted(root.rglob("*.py")):
-        digest.update(_line(file.relative_to(root).as_posix(), file))
+        digest.update(_line(file.relative_to(root).as_posix(), file).encode())
+    for line in told:
+        digest.update(f"{line}\n".encode())
+    return digest.hexdigest()[:32]
+
+
+def _lines(logs: Sequence[Path], options: IngestOptions) -> Iterator[str]:
     for log in logs:
-        digest.update(f"log {log.name}\n".encode())
-        for name, file in _files_of(log):
-            digest.update(_line(name, file))
+        yield f"log {log.name}"
+        yield from (_line(name, file) for name, file in _files_of(log))
     for field in fields(options):
         value = getattr(options, field.name)
         is_file = isinstance(value, Path) and value.is_file()
-        digest.update(_line(f"{field.name} {value.name}", value) if is_file
-                      else f"{field.name} {value}\n".encode())  # fmt: skip
+        yield _line(f"{field.name} {value.name}", value) if is_file else f"{field.name} {value}"
     if options.map is not None:
-        digest.update(_map_version(options.map).encode())
-    return digest.hexdigest()[:32]
+        yield _map_version(options.map)
 
 
 def _files_of(log: Path) -> Iterator[tuple[str, Path]]:
@@ -86,13 +104,15 @@ def _files_of(log: Path) -> Iterator[tuple[str, Path]]:
         yield from ((f.name, f) for f in (log, log.with_name(f"{log.name}-wal")) if f.is_file())
 
 
-def _line(name: str, file: Path) -> bytes:
+def _line(name: str, file: Path) -> str:
     with file.open("rb") as stream:
-        return f"{name} {hashlib.file_digest(stream, 'sha256').hexdigest()}\n".encode()
+        return f"{name} {hashlib.file_digest(stream, 'sha256').hexdigest()}"
 
 
 def _map_version(path: Path) -> str:
     """What a yaml's map is, image included, and what had to be mended in it."""
+    from slamreplay.maps.map_server import read_map
+
     remarks: list[str] = []
     try:
         return " ".join([read_map(path, warn=remarks.append).version, *remarks])

@@ -49,7 +49,5 @@ class BeamDrop:
         beams = scan_beams(view, self.name)
         if variant == "random":
             return beams.without(rng.random(len(beams.ranges_m), dtype=np.float32) < level)
-        if variant == "sector":
-            return beams.without(beams.off_middle_rad < np.radians(level) / 2.0)
-        left = beams.spread(beams.field_rad) - np.radians(level)
-        return beams.without(beams.off_middle_rad > left / 2.0)
+        off = beams.off_middle_rad if variant == "sector" else beams.off_edge_rad
+        return beams.without(off <= np.radians(level) / 2.0)

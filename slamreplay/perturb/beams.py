@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -46,35 +47,27 @@ class Beams:
         return self._ragged.spread(numbers)
 
     @cached_property
-    def index(self) -> NDArray[np.int64]:
-        """(M,) number of each beam within its scan."""
-        return np.arange(len(self.ranges_m)) - np.repeat(self._ragged.offsets[:-1], self.lengths)
-
-    @cached_property
     def returns(self) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
         """(M,) beams with a valid return, and those that saw free space to the end."""
         low, high = (self.spread(self.table[name]) for name in ("range_min_m", "range_max_m"))
         return hits_and_misses(self.ranges_m, low, high)
 
-    @cached_property
-    def field_rad(self) -> se2.Array:
-        """(N,) field of view: from the first beam to the last, or all around."""
-        step, n = np.abs(self.table["angle_increment_rad"]), self.lengths
-        is_round = (n - 1 + _SEAM_BEAMS) * step >= 2.0 * np.pi
-        return np.where(is_round, 2.0 * np.pi, np.maximum(n - 1, 0) * step)
-
-    @cached_property
+    @property
     def off_middle_rad(self) -> se2.Array:
         """(M,) angle between each beam and the middle of its scan's field of view.
 
         A scan that goes all around has no edges: its middle is the laser's x axis, which points
         ahead (REP 103), wherever the first beam is.
         """
-        first, step = self.table["angle_min_rad"], self.table["angle_increment_rad"]
-        is_round = self.field_rad >= 2.0 * np.pi
-        middle = np.where(is_round, 0.0, first + step * (self.lengths - 1) / 2.0)
-        off = self.spread(first - middle) + self.index * self.spread(step)
-        return np.abs(se2.wrap_angle(off))
+        return self._of_each(_off_middle)
+
+    @property
+    def off_edge_rad(self) -> se2.Array:
+        """(M,) angle between each beam and the nearest edge of its scan's field of view.
+
+        Of a scan that goes all around to straight behind.
+        """
+        return self._of_each(_off_edge)
 
     def with_returns(self, ranges_m: NDArray[np.float32]) -> BundleView:
         """The view with ranges (H,) in place of those of the beams with a valid return.
@@ -111,6 +104,16 @@ class Beams:
             columns["range_max_m"][self.rows] = range_max_m
         return self.view.with_table(whole.replace(**columns))
 
+    def _of_each(self, angle: Callable[[float, float, int], se2.Array]) -> se2.Array:
+        """(M,) an angle of each beam, by its scan's first bearing, step and number of beams."""
+        columns = self.table["angle_min_rad"], self.table["angle_increment_rad"], self.lengths
+        # Nearly always all scans are of one shape.
+        shapes, which = np.unique(np.column_stack(columns), axis=0, return_inverse=True)
+        of_shapes = [angle(first, step, int(n)) for first, step, n in shapes.tolist()]
+        if len(of_shapes) == 1:
+            return np.tile(of_shapes[0], len(self.table))
+        return Ragged.of(of_shapes, np.float64).take(which.ravel()).values
+
     @property
     def _ragged(self) -> Ragged:
         return self.table["ranges_m"]
@@ -141,3 +144,17 @@ def scan_beams(view: BundleView, name: str) -> Beams:
     if not len(beams.ranges_m):
         raise NotApplicableError("the log's scans hold no beam", where=name)
     return beams
+
+
+def _is_round(step: float, n: int) -> bool:
+    return (n - 1 + _SEAM_BEAMS) * abs(step) >= 2.0 * np.pi
+
+
+def _off_middle(first: float, step: float, n: int) -> se2.Array:
+    middle = 0.0 if _is_round(step, n) else first + step * (n - 1) / 2.0
+    return np.abs(se2.wrap_angle(first - middle + step * np.arange(n)))
+
+
+def _off_edge(first: float, step: float, n: int) -> se2.Array:
+    edge = np.pi if _is_round(step, n) else abs(step) * (n - 1) / 2.0
+    return edge - _off_middle(first, step, n)

@@ -13,12 +13,13 @@ from slamreplay.bundle.track import PoseTrack
 from slamreplay.bundle.view import BundleView
 from slamreplay.errors import NotApplicableError
 from slamreplay.geometry import se2
-from slamreplay.geometry.discs import range_to_disc
 from slamreplay.geometry.times import seconds_since
 from slamreplay.perturb.beams import Beams
 
-#: A person at the height of the scan, m, and a walking pace, m/s.
-_RADIUS_M, _SLOW_M_S, _FAST_M_S = 0.22, 0.7, 1.5
+#: A person at the height of the scan.
+RADIUS_M = 0.22
+#: A walking pace.
+_SLOW_M_S, _FAST_M_S = 0.7, 1.5
 #: Somebody passes at this distance from the robot's middle, comes no nearer than the last of these
 #: at any time, and walks so far before and after, m.
 _BESIDE_M, _POLITE_M, _WAY_M = (0.8, 4.0), 0.6, 10.0
@@ -26,17 +27,23 @@ _BESIDE_M, _POLITE_M, _WAY_M = (0.8, 4.0), 0.6, 10.0
 
 @dataclass(frozen=True, eq=False)
 class Met:
-    """Beams that meet somebody; one that meets two occurs twice.
+    """Which beams of which scan point at whom, person by person.
 
     Attributes:
-        beam: (K,) index of the beam among all of the laser's.
-        who: (K,) whom it meets, counted within the group.
-        range_m: (K,) range to them.
+        start: (P,) index of the scan's first beam among all of the laser's.
+        low: (P,) number of the first beam that points at them, within the scan.
+        high: (P,) number of the last one.
+        middle: (P,) the beam that points at their middle, with a fraction.
+        step_rad: (P,) between beams.
+        apart_m: (P,) from the laser to their middle.
     """
 
-    beam: NDArray[np.int64]
-    who: NDArray[np.int64]
-    range_m: NDArray[np.float32]
+    start: NDArray[np.int64]
+    low: NDArray[np.int64]
+    high: NDArray[np.int64]
+    middle: se2.Array
+    step_rad: se2.Array
+    apart_m: se2.Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,6 +58,7 @@ class Passers:
         mount: (3,) the laser on the robot.
         first: (N,) bearing of the first beam about the robot's upright axis, rad.
         step: (N,) rad between beams, signed likewise.
+        sees_m: (N,) how far the scan sees where it sees farthest.
         odometry: where the robot is between scans.
     """
 
@@ -61,11 +69,20 @@ class Passers:
     mount: se2.Array
     first: se2.Array
     step: se2.Array
+    sees_m: NDArray[np.float32]
     odometry: PoseTrack
 
     @classmethod
-    def about(cls, view: BundleView, beams: Beams, name: str) -> Passers:
+    def about(
+        cls, view: BundleView, beams: Beams, free_to_m: NDArray[np.float32], name: str
+    ) -> Passers:
         """Those about the robot of a view.
+
+        Args:
+            view: with scans and odometry.
+            beams: of its scans.
+            free_to_m: (M,) how far each beam sees, 0 where it says nothing.
+            name: of the perturbation.
 
         Raises:
             NotApplicableError: the log has no odometry at its scans, so that nothing says where
@@ -85,10 +102,14 @@ class Passers:
         sign = -1.0 if upside_down else 1.0
         t_s = seconds_since(table.t_ns[scan], int(table.t_ns[scan[0]]))
         first, step = table["angle_min_rad"][scan], table["angle_increment_rad"][scan]
-        return cls(beams, scan, t_s, base, mount, sign * first, sign * step, odometry)
+        sees_m = np.zeros(len(table), dtype=np.float32)
+        some = beams.lengths > 0
+        sees_m[some] = np.maximum.reduceat(free_to_m, _starts(beams.lengths)[some])
+        sees_m = sees_m[scan]
+        return cls(beams, scan, t_s, base, mount, sign * first, sign * step, sees_m, odometry)
 
     def draw(self, count: int, rng: np.random.Generator) -> Met:
-        """The beams that meet this many more people; those who would come too near stay away."""
+        """The beams that point at this many more people; who would come too near stays away."""
         u = rng.random((count, 5))
         passes = (u[:, 0] * len(self.t_s)).astype(np.int64)
         beside = _BESIDE_M[0] + (_BESIDE_M[1] - _BESIDE_M[0]) * u[:, 1]
@@ -114,28 +135,26 @@ class Passers:
             ).xyyaw
             base = np.where(np.isfinite(after), after, self.base[row])
             off = self._from_laser(base, where + late_s[:, None] * velocity[who])
-        return self._met(off, row, who)
+        return self._met(off, row)
 
-    def _met(self, off: se2.Array, row: NDArray[np.int64], who: NDArray[np.int64]) -> Met:
-        """Beams that meet discs whose middles lie off the laser by (P, 2) at scans (P,)."""
-        far = np.maximum(np.hypot(off[:, 0], off[:, 1]), _RADIUS_M)
+    def _met(self, off: se2.Array, row: NDArray[np.int64]) -> Met:
+        """Beams that point at discs whose middles lie off the laser by (P, 2) at scans (P,).
+
+        Those who are behind everything that a scan sees are left out.
+        """
+        apart = np.maximum(np.hypot(off[:, 0], off[:, 1]), RADIUS_M)
+        seen = apart - RADIUS_M < self.sees_m[row]
+        apart, off, row = apart[seen], off[seen], row[seen]
         step = np.abs(self.step[row])
-        middle, half = self._beam_of(off, row), np.arcsin(_RADIUS_M / far) / step
+        middle, half = self._beam_of(off, row), np.arcsin(RADIUS_M / apart) / step
         # Somebody at the seam of a scan that goes all around is met by its first beams as well.
         seam = np.flatnonzero(middle + half >= 2.0 * np.pi / step)
         pair = np.concatenate([np.arange(len(row)), seam])
         middle = np.concatenate([middle, middle[seam] - 2.0 * np.pi / step[seam]])
-        half = half[pair]
-        low = np.maximum(np.ceil(middle - half), 0.0).astype(np.int64)
-        high = np.minimum(np.floor(middle + half), self._last_beam(row[pair])).astype(np.int64)
-        lengths = np.maximum(high - low + 1, 0)
-        number = np.arange(lengths.sum()) + np.repeat(low - _starts(lengths), lengths)
-        turn = (number - np.repeat(middle, lengths)) * np.repeat(step[pair], lengths)
-        ahead = np.repeat(far[pair], lengths)
-        reach = range_to_disc(np.column_stack([ahead, np.zeros_like(ahead)]), turn, _RADIUS_M)
-        scan = np.repeat(self.scan[row[pair]], lengths)
-        beam = _starts(self.beams.lengths)[scan] + number
-        return Met(beam, np.repeat(who[pair], lengths), reach.astype(np.float32))
+        low = np.maximum(np.ceil(middle - half[pair]), 0.0).astype(np.int64)
+        high = np.minimum(np.floor(middle + half[pair]), self._last_beam(row[pair]))
+        start = _starts(self.beams.lengths)[self.scan[row[pair]]]
+        return Met(start, low, high.astype(np.int64), middle, step[pair], apart[pair])
 
     def _from_laser(self, base: se2.Array, where: se2.Array) -> se2.Array:
         """Places (P, 2) of the odometry frame as the laser of a robot at (P, 3) sees them."""

@@ -10,13 +10,12 @@ import numpy as np
 from slamreplay.bundle.view import BundleView
 from slamreplay.errors import NotApplicableError
 from slamreplay.perturb.beams import scan_beams
-from slamreplay.perturb.passers import Met, Passers
+from slamreplay.perturb.passers import Passers
 from slamreplay.perturb.variant import Variant, check_level
 
 #: People are drawn in groups, of one for each second of the log and so many more but no more than
 #: so many, and in no more groups than this: by then few beams are left to stand in front of.
 _MORE, _MOST, _GROUPS = 20, 2000, 40
-_NOBODY = np.iinfo(np.int64).max
 
 
 @dataclass(frozen=True)
@@ -47,35 +46,25 @@ class People:
         """
         if level == check_level(self.name, self.variants, variant, level).baseline:
             return view
+        from slamreplay.perturb.hiding import hide  # loads the compiler
+
         beams = scan_beams(view, self.name)
-        passers = Passers.about(view, beams, self.name)
         hits, misses = beams.returns
         free_to = np.where(misses, beams.spread(beams.table["range_max_m"]), 0.0)
         free_to = np.where(hits, beams.ranges_m, free_to).astype(np.float32)
+        passers = Passers.about(view, beams, free_to, self.name)
         valid = np.count_nonzero(hits) + np.count_nonzero(misses)
         wanted = round(level * valid)
         if not wanted:
             return view
-        by = np.full(len(free_to), _NOBODY)
         size = min(int(passers.t_s[-1]), _MOST) + _MORE
-        found: list[Met] = []
-        while np.count_nonzero(by != _NOBODY) < wanted:
-            if len(found) == _GROUPS:
-                share = np.count_nonzero(by != _NOBODY) / valid
-                raise NotApplicableError(
-                    f"people can hide {share:.2f} of the beams, not {level:g}", where=self.name
-                )
+        ranges, hidden, left = beams.ranges_m.copy(), np.zeros(len(free_to), dtype=bool), wanted
+        for _ in range(_GROUPS):
             met = passers.draw(size, rng)
-            near = met.range_m < free_to[met.beam]
-            who = met.who[near] + size * len(found)
-            found.append(Met(met.beam[near], who, met.range_m[near]))
-            np.minimum.at(by, found[-1].beam, who)
-        hidden = np.cumsum(np.bincount(by[by != _NOBODY]))
-        last = int(np.searchsorted(hidden, wanted))
-        own = np.flatnonzero(by == last)
-        until = own[len(own) - 1 - (int(hidden[last]) - wanted)]
-        ranges = beams.ranges_m.copy()
-        for met in found:
-            there = (met.who < last) | ((met.who == last) & (met.beam <= until))
-            np.minimum.at(ranges, met.beam[there], met.range_m[there])
-        return beams.with_ranges(ranges)
+            left = hide(ranges, hidden, free_to, left, met)
+            if not left:
+                return beams.with_ranges(ranges)
+        share = (wanted - left) / valid
+        raise NotApplicableError(
+            f"people can hide {share:.4f} of the beams, not {level:g}", where=self.name
+        )

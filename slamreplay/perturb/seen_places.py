@@ -1,4 +1,4 @@
-"""Places that the robot passes and sees, by its own belief."""
+"""Places that the robot passes and sees, by its own belief or by odometry."""
 
 from __future__ import annotations
 
@@ -47,18 +47,27 @@ class Seen:
     def by(cls, view: BundleView, grid: OccupancyGrid, name: str) -> Seen:
         """What is seen by the recorded belief, or from the initial pose on by odometry.
 
+        By the one with which more beams end on walls: a belief may be of another map.
+
         Raises:
             NotApplicableError: the log has no scans, or nothing that says where the robot was.
         """
         rows = scan_rows(view, name)
         table = view.table("scans").take(rows[:: max(len(rows) // _SCANS, 1)])
         scans = scan_set(view.with_table(table))
-        where = None if scans is None else _whereabouts(view, scans.t_ns)
-        if scans is None or where is None or not np.isfinite(where).any():
+        found: list[Seen] = []
+        if scans is not None:
+            measured = np.where(scans.hits, scans.ranges_m, np.nan)
+            measured[scans.misses] = np.inf
+            told = _believed(view, scans.t_ns), _by_odometry(view, scans.t_ns)
+            found = [
+                cls(grid, scans, se2.compose(where, scans.xyyaw_base_laser), measured)
+                for where in told
+                if where is not None and np.isfinite(where).any()
+            ]
+        if not found:
             raise NotApplicableError("nothing says where in the map the robot was", where=name)
-        measured = np.where(scans.hits, scans.ranges_m, np.nan)
-        measured[scans.misses] = np.inf
-        return cls(grid, scans, se2.compose(where, scans.xyyaw_base_laser), measured)
+        return max(found, key=Seen._at_walls)
 
     def wall(self, rng: np.random.Generator) -> tuple[se2.Array, se2.Array] | None:
         """(2,) a mapped wall, at a cell's centre, and (2,) the nearest place of the robot.
@@ -91,17 +100,30 @@ class Seen:
 
     def _ends(self, rng: np.random.Generator, part: se2.Array) -> se2.Array:
         """(P, 2) places on beams that came back, this part (P,) of the way to their ends."""
+        scan, beam = self._near()
+        k = rng.integers(len(scan), size=len(part)) if len(scan) else np.empty(0, dtype=np.int64)
+        return self._along(scan[k], beam[k], part[: len(k)])
+
+    def _near(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Scan and number of every beam that came back from nearby."""
         near = (self.measured > _NEAR_M) & (self.measured < _FAR_M)
-        near &= np.isfinite(self.laser[:, :1])
-        scan, beam = np.nonzero(near)
-        if not len(scan):
-            return np.empty((0, 2))
-        k = rng.integers(len(scan), size=len(part))
-        scan, beam = scan[k], beam[k]
+        scan, beam = np.nonzero(near & np.isfinite(self.laser[:, :1]))
+        return scan, beam
+
+    def _along(
+        self, scan: NDArray[np.int64], beam: NDArray[np.int64], part: se2.Array
+    ) -> se2.Array:
+        """(P, 2) places this part (P,) of the way along beams (P,)."""
         turn = self.scans.angle_min[scan] + beam * self.scans.angle_increment[scan]
         reach = self.measured[scan, beam] * part
         ends = np.column_stack([reach * np.cos(turn), reach * np.sin(turn)])
         return se2.transform_points(self.laser[scan], ends[:, None])[:, 0]
+
+    def _at_walls(self) -> float:
+        """Share of some of the beams that ends on walls of the map."""
+        scan, beam = (which[:: max(len(which) // 1000, 1)] for which in self._near())
+        cells = self._nearest_wall(self._along(scan, beam, np.ones(len(scan))))
+        return float(np.mean(cells[:, 0] >= 0)) if len(cells) else 0.0
 
     def _towards(self, places: se2.Array) -> tuple[se2.Array, se2.Array]:
         """(P, S) distance of each place from each scan, and the range measured towards it."""
@@ -165,11 +187,14 @@ def _disc(radius: float) -> NDArray[np.int64]:
     return np.column_stack([row, col])[order]
 
 
-def _whereabouts(view: BundleView, t_ns: NDArray[np.int64]) -> se2.Array | None:
-    """(N, 3) base in map at times (N,)."""
+def _believed(view: BundleView, t_ns: NDArray[np.int64]) -> se2.Array | None:
+    """(N, 3) base in map at times (N,), as the robot believed."""
     belief = recorded_belief(view, t_ns)
-    if belief is not None and belief.has_pose.any():
-        return belief.xyyaw
+    return None if belief is None else belief.xyyaw
+
+
+def _by_odometry(view: BundleView, t_ns: NDArray[np.int64]) -> se2.Array | None:
+    """(N, 3) base in map at times (N,), from the first initial pose on by odometry."""
     odometry, given = odometry_track(view), view.role("initial_pose")
     if odometry is None or given is None or not len(given):
         return None

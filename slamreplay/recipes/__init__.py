@@ -1,7 +1,8 @@
 """Recipes: one question each, as a YAML file that says all its answer rests on."""
 
+from slamreplay.recipes.budget import BudgetRecipe
 from slamreplay.recipes.dose_recipe import DoseRecipe
 from slamreplay.recipes.lab_recipe import LabRecipe
 from slamreplay.recipes.recipe import Recipe, read_recipe
 
-__all__ = ["DoseRecipe", "LabRecipe", "Recipe", "read_recipe"]
+__all__ = ["BudgetRecipe", "DoseRecipe", "LabRecipe", "Recipe", "read_recipe"]

@@ -13,7 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from slamreplay.doses.metrics import limit_of
 from slamreplay.doses.plan import MAX_TRIALS, Axis, Dose, Plan, of_levels, of_search, variant_of
 from slamreplay.errors import UsageError
-from slamreplay.estimators import ESTIMATORS, RECORDED
+from slamreplay.estimators import ESTIMATORS
 from slamreplay.recipes.validation import one_line, validated
 from slamreplay.registry import nearest
 from slamreplay.simulate import SCENARIOS
@@ -154,12 +154,10 @@ def check_estimators(names: list[str]) -> None:
     """Refuse names that no trial can be made of.
 
     Raises:
-        UsageError: an unknown name, one given twice, or one whose run was recorded.
+        UsageError: an unknown name, or one given twice.
     """
     for name in names:
         ESTIMATORS.load(name)
-        if name in RECORDED:
-            raise UsageError(f"'{name}' was recorded and cannot be run again", hint="leave it out")
     if len(set(names)) != len(names):
         raise UsageError("an estimator is named twice")
 

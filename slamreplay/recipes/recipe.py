@@ -9,22 +9,24 @@ from typing import Any
 from slamreplay.errors import UsageError
 from slamreplay.labs import LABS
 from slamreplay.plain_yaml import read_plain_yaml
+from slamreplay.recipes.budget import BudgetFile, BudgetRecipe, budget_recipe
 from slamreplay.recipes.dose_recipe import DoseFile, DoseRecipe, dose_recipe
 from slamreplay.recipes.lab_recipe import LabFile, LabRecipe, lab_recipe
 from slamreplay.recipes.validation import unknown_key
 
 VERSION = 1
 
-Recipe = LabRecipe | DoseRecipe
+Recipe = LabRecipe | DoseRecipe | BudgetRecipe
 #: The key that only one kind has, and who reads it.
 _KINDS: dict[str, Callable[[Mapping[str, Any], Path], Recipe]] = {
     "lab": lab_recipe,
     "perturbations": dose_recipe,
+    "budget": budget_recipe,
 }
 
 
 def read_recipe(path: Path) -> Recipe:
-    """The recipe in a YAML file: `lab` says that it is a laboratory, `perturbations` a design.
+    """The recipe in a YAML file: `lab`, `perturbations` (a design) or `budget` is its kind.
 
     Raises:
         UsageError: no plain YAML, another version, a name or a key that there is not, or a value
@@ -41,12 +43,13 @@ def read_recipe(path: Path) -> Recipe:
                          hint="a recipe asks one question")  # fmt: skip
     if kinds:
         return _KINDS[kinds[0]](given, path)
-    known = {**LabFile.model_fields, **DoseFile.model_fields}
+    known = {**LabFile.model_fields, **DoseFile.model_fields, **BudgetFile.model_fields}
     for key in given:
         if key not in known:
             what, hint = unknown_key(key, known)
             raise UsageError(what, where=path, hint=hint)
     raise UsageError(
-        "the key 'lab' or 'perturbations' is missing", where=path,
-        hint=f"lab: one of {', '.join(LABS)}; perturbations: a list of name and levels",
+        "the key 'lab', 'perturbations' or 'budget' is missing", where=path,
+        hint=f"lab: one of {', '.join(LABS)}; perturbations: a list of name and levels; budget: "
+        "rates and stages",
     )  # fmt: skip

@@ -44,7 +44,7 @@ def design(
     if seed < 0:
         raise UsageError(f"seed {seed} is negative")
     for name in estimators:
-        ESTIMATORS.load(name)
+        ESTIMATORS.target(name)
     columns: list[tuple[str | None, float | None, str]] = [(None, None, "")]
     for text in perturbations:
         name, variant, level, unit = parse_perturbation(text)

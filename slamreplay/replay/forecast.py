@@ -54,14 +54,18 @@ class Forecast:
         unseen = set(first.values())
         return sorted(order, key=lambda t: (t not in unseen, -self.seconds(t), order[t]))
 
-    def left_s(self, waiting: Sequence[Trial], running: Mapping[Trial, float], cores: int) -> float:
-        """Seconds until all is done.
+    def left_s(
+        self, waiting: Sequence[Trial], running: Mapping[Trial, float], cores: int
+    ) -> float | None:
+        """Seconds until all is done; None before the first trial ended.
 
         Args:
             waiting: not yet begun.
             running: since how many seconds each runs.
             cores: trials that run at once.
         """
+        if not self.known:
+            return None
         rest = [max(self.seconds(t) - since, 0.0) for t, since in running.items()]
         todo = [self.seconds(trial) for trial in waiting]
         return max(max(rest + todo, default=0.0), (sum(rest) + sum(todo)) / max(cores, 1))

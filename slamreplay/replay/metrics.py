@@ -9,6 +9,7 @@ import numpy as np
 
 from slamreplay.bundle.run import Run
 from slamreplay.bundle.schema import JUDGING_KINDS
+from slamreplay.bundle.tables import Table
 from slamreplay.bundle.track import PoseTrack
 from slamreplay.bundle.view import Bundle
 from slamreplay.geometry import se2, se3
@@ -67,6 +68,10 @@ def trial_metrics(run: Run, runs: Sequence[Run], bundle: Bundle) -> Metrics:
 def judging_reference(bundle: Bundle) -> PoseTrack | None:
     """The poses of the references that only judge, or None where the log has none."""
     table = bundle.table("references")
+    return bundle.shared.of("judging reference", (), [table], lambda: _judging(table))
+
+
+def _judging(table: Table) -> PoseTrack | None:
     table = table.take(np.isin(table["kind"].astype(str), sorted(JUDGING_KINDS)))
     if not len(table):
         return None

@@ -53,10 +53,17 @@ def available_cores() -> int:
 
 @dataclass(frozen=True)
 class Ended:
-    """A trial that a worker is done with; the run is None where the worker failed at it."""
+    """A trial that a worker is done with.
+
+    Attributes:
+        trial: which.
+        run: None where the worker failed at it.
+        seconds: that it took; None where its process did not live to its end.
+    """
 
     trial: Trial
     run: Run | None
+    seconds: float | None = None
 
 
 @dataclass(eq=False)
@@ -104,7 +111,7 @@ class Workers:
         Args:
             trials: what is to be done, each once.
             most: workers to use.
-            forecast: says which to begin next, and learns.
+            forecast: says which to begin next.
         """
         waiting, killed = list(trials), dict.fromkeys(trials, 0)
         again: list[Trial] = []
@@ -136,8 +143,7 @@ class Workers:
                     else:
                         yield Ended(mine, Run(mine, None, _killed_words(-code)))
                 elif mine is not None:
-                    forecast.learn(mine, monotonic() - worker.since)
-                    yield Ended(mine, _run_from(line.strip()))
+                    yield Ended(mine, _run_from(line.strip()), monotonic() - worker.since)
         finally:  # whoever stops listening does not want the rest
             for worker in [w for w in self._workers if w.trial is not None]:
                 worker.process.kill()

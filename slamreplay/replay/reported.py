@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
-from slamreplay.bundle.run import Estimate
+from slamreplay.bundle.run import Estimate, Trial
+from slamreplay.bundle.view import BundleView
 
 #: The covariance of every pose, times this.
 POSE_COVARIANCE = "pose_covariance_scale"
@@ -19,3 +20,11 @@ def as_reported(estimate: Estimate, settings: Mapping[str, float]) -> Estimate:
         return estimate
     track = estimate.track
     return replace(estimate, track=replace(track, cov=settings[POSE_COVARIANCE] * track.cov))
+
+
+def as_published(view: BundleView, trial: Trial) -> BundleView:
+    """The log whose localizer published its poses as a trial of the recorded one has them."""
+    if trial.level is None or not (trial.perturbation or "").startswith(f"{POSE_COVARIANCE}."):
+        return view
+    poses = view.table("poses")
+    return view.with_table(poses.replace(covariance=trial.level * poses["covariance"]))

@@ -52,15 +52,24 @@ def keep_run(run: Run, cache: Path) -> bool:
 
 
 def _key(trial: Trial) -> str:
-    """Hash of everything a run depends on: evidence, trial, configuration, code, numpy."""
-    estimator = ESTIMATORS.load(trial.estimator)
-    configuration = repr(configured(trial.estimator, trial.parameters))
-    parts = [json.dumps(trial.record), configuration, _code(), np.__version__]
-    parts.append(_source(estimator))
+    """Hash of everything a run depends on: evidence, trial, configuration, code, numpy.
+
+    What comes with the package is not loaded for it: its defaults are part of its code.
+    """
+    parts = [json.dumps(trial.record), _code(), np.__version__]
+    if not _is_ours(ESTIMATORS.target(trial.estimator)):
+        parts.append(repr(configured(trial.estimator, trial.parameters)))
+        parts.append(_source(ESTIMATORS.load(trial.estimator)))
     if trial.perturbation is not None:
-        perturbation = PERTURBATIONS.load(trial.perturbation.partition(".")[0])
-        parts += [repr(perturbation()), _source(perturbation)]
+        name = trial.perturbation.partition(".")[0]
+        if not _is_ours(PERTURBATIONS.target(name)):
+            perturbation = PERTURBATIONS.load(name)
+            parts += [repr(perturbation()), _source(perturbation)]
     return hashlib.sha256("\0".join(parts).encode()).hexdigest()
+
+
+def _is_ours(target: str) -> bool:
+    return target.startswith(tuple(f"slamreplay.{package}." for package in _CODE))
 
 
 @once
@@ -73,7 +82,7 @@ def _code() -> str:
 
 
 def _source(thing: Any) -> str:
-    """The file a plug-in comes from: ours are hashed with the package already."""
+    """The file that a plug-in comes from."""
     try:
         return Path(inspect.getfile(thing)).read_text(encoding="utf-8")
     except (OSError, TypeError):

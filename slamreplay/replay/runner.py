@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from time import monotonic
 from types import TracebackType
@@ -14,12 +14,11 @@ from slamreplay.errors import UsageError
 from slamreplay.replay.forecast import Forecast
 from slamreplay.replay.one_trial import run_trial
 from slamreplay.replay.parallel import Ended, Workers, worth_workers
+from slamreplay.replay.round import Progress, Round
 from slamreplay.replay.run_cache import cached_run, keep_run
+from slamreplay.replay.watch import Watch
 
 __all__ = ["Replayer", "replay", "run_trial"]
-
-#: Told what is being done, and the share of the work that is done.
-Progress = Callable[[str, float], None]
 
 
 def replay(
@@ -48,6 +47,7 @@ class Replayer:
             soon as it is done: after a kill the same trials go on from where they were.
         workers: processes that share the trials, one per core by default; a short log and a bundle
             that is not on disk are done in this one. Runs are the same bit by bit.
+        watch: told where every trial stands, for whoever looks on.
     """
 
     def __init__(
@@ -57,11 +57,13 @@ class Replayer:
         progress: Progress | None = None,
         cache: Path | None = None,
         workers: int | None = None,
+        watch: Watch | None = None,
     ) -> None:
         self.bundle = bundle
-        self._tell: Progress = progress or (lambda words, share: None)  # noqa: ARG005 - nobody
+        self._progress = progress
         self._cache = None if bundle.path is None else cache
         self._most = workers
+        self._watch = watch
         self._forecast = Forecast()
         self._workers: Workers | None = None
 
@@ -82,11 +84,15 @@ class Replayer:
             self._workers.close()
             self._workers = None
 
-    def replay(self, trials: Sequence[Trial]) -> list[Run]:
+    def replay(self, trials: Sequence[Trial], *, progress: Progress | None = None) -> list[Run]:
         """A run for each trial, in their order.
 
         A trial that the log or the estimator does not allow gives a run without an estimate that
         says why.
+
+        Args:
+            trials: a round of them.
+            progress: of this round, in place of the general one.
 
         Raises:
             UsageError: a trial is of another bundle, or names what does not exist, or has
@@ -95,47 +101,47 @@ class Replayer:
         for trial in trials:
             if trial.bundle_id != self.bundle.manifest.bundle_id:
                 raise UsageError(f"trial {trial.id} is of another bundle", where=trial.bundle_id)
+        tell = progress or self._progress
         known = {trial: cached_run(trial, self._cache) for trial in dict.fromkeys(trials)}
         runs = {trial: run for trial, run in known.items() if run is not None}
+        round_ = Round(
+            list(known), runs, self._forecast, tell, self._watch, self.bundle.path, self._cache
+        )
         pending = [trial for trial in known if trial not in runs]
-        runs |= dict(self._computed(pending))
-        self._tell("replayed", 1.0)
+        most = worth_workers(self.bundle, pending) if self._most is None else self._most
+        if most < 2 or self.bundle.path is None:
+            runs |= dict(self._one_by_one(pending, round_))
+        elif pending:
+            runs |= dict(self._together(pending, round_, most, self.bundle.path))
+        round_.tell({}, 1)
+        if tell is not None:
+            tell("replayed", 1.0)
         return [runs[trial] for trial in trials]
 
-    def _computed(self, pending: Sequence[Trial]) -> Iterator[tuple[Trial, Run]]:
-        most = worth_workers(self.bundle, pending) if self._most is None else self._most
-        done: list[Trial] = []
-        if most < 2 or self.bundle.path is None:
-            for place, trial in enumerate(pending):
-                waiting = pending[place:]
-                self._tell(_words(trial), self._forecast.share(done, waiting, {}))
-                since = monotonic()
-                yield trial, self._here(trial)
-                self._forecast.learn(trial, monotonic() - since)
-                done.append(trial)
-                self._tell(_words(trial), self._forecast.share(done, waiting[1:], {}))
-            return
+    def _one_by_one(self, pending: Sequence[Trial], round_: Round) -> Iterator[tuple[Trial, Run]]:
+        for trial in pending:
+            round_.tell({trial: 0.0}, 1)
+            since = monotonic()
+            yield trial, self._here(trial)
+            round_.end(trial, monotonic() - since)
+            round_.tell({}, 1, trial)
+
+    def _together(
+        self, pending: Sequence[Trial], round_: Round, most: int, path: Path
+    ) -> Iterator[tuple[Trial, Run]]:
         if self._workers is None:
-            self._workers = Workers(self.bundle.path, self._cache)
-        share = 0.0
+            self._workers = Workers(path, self._cache)
+        last = None
         for event in self._workers.run_each(pending, most, self._forecast):
             if isinstance(event, Ended):
                 # What no worker did is done here, where its fault shows.
                 yield event.trial, event.run or self._here(event.trial)
-                done.append(event.trial)
-            running = self._workers.running
-            waiting = [t for t in pending if t not in done and t not in running]
-            share = max(share, self._forecast.share(done, waiting, running))
-            self._tell(_words(next(iter(running), pending[-1])), share)
+                round_.end(event.trial, event.seconds)
+                last = event.trial
+            round_.tell(self._workers.running, most, last)
 
     def _here(self, trial: Trial) -> Run:
         run = run_trial(self.bundle, trial)
         if self._cache is not None:
             keep_run(run, self._cache)
         return run
-
-
-def _words(trial: Trial) -> str:
-    if trial.perturbation is None:
-        return f"{trial.estimator}, baseline"
-    return f"{trial.estimator}, {trial.perturbation} {trial.level:g} {trial.unit}"

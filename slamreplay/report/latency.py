@@ -52,7 +52,7 @@ def latency_part(post: Postmortem) -> LatencyPart | None:
         localizer=None if said is None else said.source,
         dated=None if said is None else said.dated,
         ahead_s=None if said is None else said.lead_s,
-        consumers=[_usage(usage) for usage in post.usages],
+        consumers=[usage_part(usage) for usage in post.usages],
     )
 
 
@@ -103,7 +103,8 @@ def _ms(seconds: float | None) -> str:
     return number(None if seconds is None else 1e3 * seconds, ".0f", "ms")
 
 
-def _usage(usage: Usage) -> UsagePart:
+def usage_part(usage: Usage) -> UsagePart:
+    """One consumer, as report.json has it."""
     user, over = usage.ages.consumer, usage.over
     return UsagePart(
         name=user.name,

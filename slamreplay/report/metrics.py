@@ -11,6 +11,7 @@ from slamreplay.consistency.belief.credibility import nees_of_belief
 from slamreplay.consistency.context import CheckContext
 from slamreplay.consistency.evidence.nees import nees
 from slamreplay.consistency.evidence.source import Reference
+from slamreplay.replay.reported import as_published
 from slamreplay.verdict.limits import Limits
 
 #: Estimators that are the robot's own belief as it was published.
@@ -28,7 +29,7 @@ _NEES_NAMES = ("nees_mean", "nees_low", "nees_high", "nees_dof", "nees_n_eff")
 def asked_of(run: Run, references: tuple[Reference, ...], view: BundleView) -> CheckContext:
     """A run as the checks are given it: the recorded localizer at the updates it published."""
     if run.estimate is not None and run.trial.estimator in PUBLISHED:
-        return CheckContext(run.estimate.track, references, view)
+        return CheckContext(run.estimate.track, references, as_published(view, run.trial))
     return CheckContext.of_run(run, references, view)
 
 

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from slamreplay.geometry import se2
-from slamreplay.geometry.discs import range_to_disc
 
 RADIUS_M = 0.22
 #: Where somebody is who is not there.
@@ -74,5 +73,9 @@ def ranges_to(walkers: tuple[Walker, ...], t_s: se2.Array, rays: se2.Array) -> s
     nearest = np.full(len(t_s), np.inf)
     for walker in walkers:
         off = walker.at(t_s) - rays[:, :2]
-        nearest = np.minimum(nearest, range_to_disc(off, rays[:, 2], walker.radius_m))
+        along = off[:, 0] * np.cos(rays[:, 2]) + off[:, 1] * np.sin(rays[:, 2])
+        beside2 = np.sum(off**2, axis=1) - along**2
+        half = np.sqrt(np.maximum(walker.radius_m**2 - beside2, 0.0))
+        hit = (beside2 < walker.radius_m**2) & (along > half)
+        nearest = np.where(hit, np.minimum(nearest, along - half), nearest)
     return nearest

@@ -65,7 +65,8 @@ def summary(
     if doubt is not None and tells_of_map:
         clauses.insert(1, doubt)
     if stops and state not in ("insufficient_data", "unobservable"):
-        clauses.insert(2 if doubt is not None and tells_of_map else 1, _stopped(stops, start_ns))
+        stopped = _stopped(stops, start_ns, has_belief=has_belief)
+        clauses.insert(2 if doubt is not None and tells_of_map else 1, stopped)
     text = clauses[0]
     for clause in clauses[1:]:
         if len(text) + len(clause) + 3 <= MOST_CHARACTERS:
@@ -159,13 +160,15 @@ def _within(intervals: Sequence[Interval]) -> str:
     return f" (to within {max(errors):.2f} m)" if close else ""
 
 
-def _stopped(stops: Sequence[Stop], start_ns: int) -> str:
+def _stopped(stops: Sequence[Stop], start_ns: int, *, has_belief: bool) -> str:
     first = stops[0]
-    was = {
+    of_map = {"map_changed": "the map did not hold", "healthy": "the map held"}
+    of_both = {
         "lost": "it was lost",
         "map_changed": "it was not lost",
         "lost_and_map_changed": "it was lost in a changed aisle",
         "healthy": "it was not lost",
-    }.get(first.state, "its state cannot be judged")
+    }
+    was = (of_both if has_belief else of_map).get(first.state, "its state cannot be judged")
     more = "" if len(stops) == 1 else f", first of {len(stops)} stops"
     return f"when it stopped at {(first.t_ns - start_ns) / NS_PER_S:.1f} s {was}{more}"

@@ -55,8 +55,8 @@ def results(rows: Sequence[Row], verdicts: Mapping[str, str]) -> LabResults:
         ),
         (
             "where it was: 95 % of hindsight's poses are as near to the simulator's, which no log "
-            "holds here. Motions the gate allows: of all that could be asked, and the mean "
-            "clearance. Stops, then recoveries, as recorded or as inferred."
+            "holds here. Motions and recoveries that the gate allows, of all that could be asked, "
+            "and their mean clearance. Stops, then recoveries, as recorded or as inferred."
         ),
     ]
     titles = {log: tables[k].title for k, log in enumerate(verdicts)}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -54,7 +55,7 @@ def _no_covariance(records: Sequence[Record]) -> Sequence[Record]:
     return [r if r.topic != _POSE else replace(r, message=_of_zeros(r.message)) for r in records]
 
 
-def _of_zeros(message):  # type: ignore[no-untyped-def]
+def _of_zeros(message: Any) -> Any:
     return replace(message, pose=replace(message.pose, covariance=np.zeros(36)))
 
 

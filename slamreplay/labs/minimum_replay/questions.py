@@ -53,7 +53,7 @@ def _state(post: Postmortem, _: Recording) -> Answer:
         return NONE
     if post.belief is None or not post.belief.has_pose.any():
         half = "map changed" if "changed" in state else "map right"
-        return Answer(f"{half}, lost: ?", words=f"{state}?")
+        return Answer(f"{half}; lost?", words=f"{state}?")
     return Answer(state.replace("_", " "), words=state)
 
 
@@ -83,7 +83,7 @@ def _nees(post: Postmortem, _: Recording) -> Answer:
     if post.nees is None:
         return NONE
     test = post.nees.summary().test
-    return Answer(f"mean {test.mean:.3g}", (test.mean,)) if test.n else NONE
+    return NONE if test.mean is None else Answer(f"mean {test.mean:.3g}", (test.mean,))
 
 
 def _changed(post: Postmortem, _: Recording) -> Answer:
@@ -100,7 +100,7 @@ def _gate(post: Postmortem, _: Recording) -> Answer:
         return NONE
     allowed = sum(bool(a.allowed) for a in asked)
     clearance = float(np.mean([a.clearance_m for a in asked if a.clearance_m is not None] or [0.0]))
-    text = f"{allowed} of {len(asked)}, {clearance:.2f} m clear"
+    text = f"{allowed} of {len(asked)}, {clearance:.2f} m"
     return Answer(text, (allowed, len(asked), clearance))
 
 
@@ -129,7 +129,7 @@ QUESTIONS: dict[str, Callable[[Postmortem, Recording], Answer]] = {
     "error of the belief": _error,
     "its NEES": _nees,
     "what had changed": _changed,
-    "motions the gate allows": _gate,
+    "motions allowed, clearance": _gate,
     "actions with a whole contract": _contract,
     "stops and recoveries": _stops,
 }

@@ -1,0 +1,1 @@
+"""Whether poses come fresh enough for planner and controller, and what one more stage would do."""
