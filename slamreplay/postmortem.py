@@ -31,6 +31,8 @@ from slamreplay.report.metrics import asked_of, run_metrics
 from slamreplay.rootcause.answer import root_cause
 from slamreplay.rootcause.mode import mode_of
 from slamreplay.verdict.judge import judge
+from slamreplay.verdict.latency.findings import late_findings
+from slamreplay.verdict.latency.latency import latency, usages
 from slamreplay.verdict.limits import Limits
 
 __all__ = ["Postmortem", "postmortem"]
@@ -94,6 +96,9 @@ def postmortem(
     reference, kind = (None, None) if best is None else (best.track, best.kind)
     findings = [*judgement.findings, *unused_references(bundle, context.updates)]
     findings += sensed_references(bundle, found, hold_out)
+    late = latency(view, streams=context.audit.streams)
+    used = usages(late)
+    findings += late_findings(late, used, limits)
     of_runs = [asked_of(run, references, view) for run in runs]
     # What the localizer said was asked already, as the robot's own belief.
     rerun = [
@@ -143,6 +148,8 @@ def postmortem(
         jumps=tuple((asked_run.trial, jumps_of(asked)) for asked_run, asked in everybody),
         trace_ns=trace_ns,
         root_cause=began,
+        latency=late,
+        usages=used,
     )
 
 

@@ -11,8 +11,9 @@ from slamreplay.ingest import DECODERS
 from slamreplay.perturb import PERTURBATIONS
 from slamreplay.testing import check_decoder, check_estimator, check_noise, check_perturbation
 from slamreplay.testing.decoders import check_payload
+from slamreplay.testing.edits import with_maps
 from slamreplay.testing.matched import WorldNoise, noisy_bundle
-from slamreplay.testing.synthetic import synthetic_bundle
+from slamreplay.testing.synthetic import START_NS, room_grid, synthetic_bundle
 
 #: Name, and by how much sampling noise lets its poses miss a moved map frame: m, rad.
 ESTIMATOR_LINES = {
@@ -41,12 +42,52 @@ WORLDS = {
 }
 
 PERTURBATION_LINES = (
+    "beam_drop",
+    "clock_skew",
+    "frame_swap",
+    "gyro_bias",
+    "handedness",
+    "imu_drop",
     "initial_pose",
+    "laser_extrinsic",
+    "map_edit",
+    "map_rotate",
+    "map_shift",
+    "map_stale",
+    "max_range",
+    "measurement_noise_scale",
+    "min_score",
+    "odometry_drop",
+    "odometry_noise",
     "odometry_scale",
+    "odometry_slip",
+    "particle_count",
+    "people",
+    "pose_covariance_scale",
+    "process_noise_scale",
+    "quaternion_order",
+    "range_bias",
+    "range_noise",
     "scan_delay",
     "scan_drop",
+    "stamp_jitter",
     "tf_delay",
+    "unit_error",
 )
+
+
+def redrawn_bundle():
+    """A log in which the map was drawn anew once, a little otherwise."""
+    old, new = room_grid(), room_grid().cells.copy()
+    new[60:64, 20:24] = 100
+    new = type(old)(new, old.resolution_m, old.origin_xyyaw)
+    bundle = synthetic_bundle(seconds=24.0)
+    return with_maps(bundle, [(START_NS, old), (START_NS + 12_000_000_000, new)])
+
+
+#: Evidence and levels of those that need others than usual.
+PERTURBED = {"map_stale": redrawn_bundle}
+PERTURBED_BY = {"map_stale": {"versions": 1.0, "age": 30.0}}
 
 STAMP = {"sec": 3, "nanosec": 4}
 HEADER = {"stamp": STAMP, "frame_id": "/f"}
@@ -697,7 +738,8 @@ def test_estimators_covariance_follows_its_noise(name):
 
 @pytest.mark.parametrize("name", PERTURBATION_LINES)
 def test_perturbation(name):
-    check_perturbation(PERTURBATIONS.load(name)())
+    made = PERTURBED.get(name, partial(synthetic_bundle, seconds=8.0, with_imu=True))
+    check_perturbation(PERTURBATIONS.load(name)(), bundle=made(), levels=PERTURBED_BY.get(name))
 
 
 @pytest.mark.parametrize("name", DECODER_LINES)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from scipy.linalg import solve_toeplitz, toeplitz
-from scipy.signal import lfilter
+from scipy.signal import lfilter, lfiltic
 from scipy.stats import binom, chi2
 
 from slamreplay.consistency.statistics.autoregression import (
@@ -129,6 +129,19 @@ def test_burg_finds_the_model_and_its_autocorrelation():
     np.testing.assert_allclose(solve_toeplitz(rho[:2], rho[1:3]), a, atol=0.02)  # Yule-Walker
     assert left[2] == pytest.approx(1.0 / np.var(series), rel=0.05)
     assert (np.linalg.eigvalsh(toeplitz(rho)) > 0).all()
+
+
+def test_autocorrelation_goes_on_as_scipys_filter():
+    reflection = np.array([0.9, -0.5, 0.3, -0.2])
+    rho, (head, a) = autocorrelation_of(reflection, 60), (np.zeros(5), np.zeros(4))
+    for k, r in enumerate(reflection):  # the model's coefficients, by Levinson's recursion
+        a[: k + 1] = np.append(a[:k] - r * a[:k][::-1], r)
+    head[:] = rho[:5]
+    model = np.append(1.0, -a)
+
+    rest = lfilter([1.0], model, np.zeros(55), zi=lfiltic([1.0], model, head[:0:-1]))[0]
+
+    np.testing.assert_allclose(rho[5:], rest, rtol=1e-12, atol=1e-15)
 
 
 @pytest.mark.parametrize(("n", "m", "order"), [(200, 3, 12), (7, 2, 6), (2, 1, 1), (40, 1, 10)])

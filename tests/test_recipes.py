@@ -221,7 +221,7 @@ HOSTILE = {
     "lab misspelt": (SMALL.replace("covariance_breathing", "covariance_breathin"), "did you mean"),
     "lab elsewhere": (SMALL.replace("lab: covariance_breathing", "lab: os:system"), "no lab"),
     "key of lab misspelt": (SMALL.replace("lab:", "labb:"), "did you mean 'lab'?"),
-    "no lab": ("version: 1\n", "the key 'lab' is missing"),
+    "no lab": ("version: 1\n", "the key 'lab' or 'perturbations' is missing"),
     "key": (SMALL.replace("step_m:", "stp_m:", 1), "'parameters.stp_m' (hint"),
     "parameter": (SMALL.replace("range_sigma_m:", "range_sigma:"), "mean 'range_sigma_m'?"),
     "nested": (SMALL.replace("grows_from_ratio", "grows_ratio"), "mean 'grows_from_ratio'?"),

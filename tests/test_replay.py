@@ -10,7 +10,7 @@ from slamreplay.bundle.schema import TABLES
 from slamreplay.bundle.store import write_bundle
 from slamreplay.bundle.view import Bundle
 from slamreplay.errors import BundleError, OutputError, UsageError
-from slamreplay.replay import parallel, runner
+from slamreplay.replay import parallel, run_cache, runner
 from slamreplay.replay.design import design, parse_perturbation
 from slamreplay.replay.folder import is_runs, read_runs, write_runs
 from slamreplay.replay.metrics import trial_metrics
@@ -127,7 +127,7 @@ def test_second_time_comes_from_the_cache_and_damage_is_computed_again(
 def test_the_cache_does_not_answer_after_the_code_changed(bundle, tmp_path, monkeypatch):
     trials = design(bundle, ["dead_reckoning"], [], 0)
     runner.replay(bundle, trials, cache=tmp_path)
-    monkeypatch.setattr(runner, "_code", lambda: "other code")
+    monkeypatch.setattr(run_cache, "_code", lambda: "other code")
 
     runner.replay(bundle, trials, cache=tmp_path)
 

@@ -34,12 +34,14 @@ from slamreplay.report.facts import deciding_facts
 from slamreplay.report.html import html
 from slamreplay.report.innovations import innovations
 from slamreplay.report.junit import junit_xml
+from slamreplay.report.latency import latency_note, usage_table
 from slamreplay.report.model import SCHEMA_FILE, Report, schema_text
 from slamreplay.report.phrases import bound
 from slamreplay.report.tables import trials as trial_table
 from slamreplay.report.writer import write_report
 from slamreplay.testing.synthetic import START_NS, room_grid, synthetic_bundle, true_path
 from slamreplay.verdict.judgement import Action, FailureMode, Interval, Judgement, Stop
+from slamreplay.verdict.latency.latency import latency, usages
 from slamreplay.verdict.limits import Limits
 from slamreplay.verdict.reliability import Bin, Reliability
 
@@ -166,10 +168,32 @@ def test_report_json_has_the_contracts_keys_and_is_valid(post, bare):
         jsonschema.validate(content, schema)
         assert list(content) == [
             "schema_version", "slamreplay", "bundle", "verdict", "intervals", "changed_regions",
-            "reference", "failure_mode", "root_cause", "stops", "actions", "findings", "trials", "ledger",
-            "jumps", "trace",
+            "reference", "failure_mode", "root_cause", "stops", "actions", "findings", "trials",
+            "ledger", "jumps", "trace", "latency",
         ]  # fmt: skip
         assert Report.model_validate_json(build(each).json_text()) == build(each)
+
+
+def test_the_age_of_the_pose_is_in_report_json_and_on_the_page(post, bare):
+    found = latency(synthetic_bundle(seconds=5.0).view())
+    aged = replace(post, latency=found, usages=usages(found))
+    content = json.loads(build(aged).json_text(), parse_constant=pytest.fail)
+    jsonschema.validate(content, json.loads(schema_text()))
+    controller, planner = content["latency"]["consumers"]
+
+    assert (content["latency"]["basis"], content["latency"]["dated"]) == ("shared", "scan")
+    assert (controller["name"], controller["topic"], planner["rate_hz"]) == (
+        "controller", None, None
+    )  # fmt: skip
+    assert controller["pose_s"]["p50"] <= controller["pose_s"]["p95"] <= controller["pose_s"]["max"]
+    assert controller["correction_s"]["max"] < 0.51
+    shown = usage_table(aged)
+    assert [row[0].text for row in shown.rows] == ["controller", "planner"]
+    assert "as if at the budget's rate" in shown.rows[0][0].aside
+    assert "until its scan was there" in latency_note(aged)
+    assert build(bare).latency is None
+    assert usage_table(bare).rows == ()
+    assert latency_note(bare) == ""
 
 
 def test_every_key_is_there_and_the_unknown_is_null(post, bare):

@@ -37,10 +37,12 @@ class Place:
 
 def world_of(kind: str, rng: np.random.Generator, conditions: tuple[str, ...]) -> Place:
     """Where an incident of a kind happens; racks are moved in warehouses only."""
-    if "hall_100" in conditions and kind != "identical_aisles":
+    if "hall_100" in conditions and kind not in ("identical_aisles", "vague_start"):
         return Place(random_warehouse(rng, (100.0, 100.0)))
     if kind == "identical_aisles":
         return Place(*repeated_aisles(rng))
+    if kind == "vague_start":
+        return Place(*repeated_aisles(rng, shorter=0))
     if kind in _STRUCTURE or rng.random() < 0.6:
         return Place(random_warehouse(rng))
     return Place(random_office(rng))

@@ -13,6 +13,7 @@ import numpy as np
 from slamreplay.bench import faults, tours
 from slamreplay.bench.conditions import CONDITIONS, conditioned, world_of
 from slamreplay.bench.crowds import crowd
+from slamreplay.bench.single_causes import SINGLE_CAUSES, on_pitch, on_single
 from slamreplay.errors import UsageError
 from slamreplay.simulate.drive import drive
 from slamreplay.simulate.recording import Recording, record
@@ -39,6 +40,8 @@ KINDS: tuple[str, ...] = (
     "map_frame",
     "wrong_map",
 )
+#: All that can be made. New kinds come last: a kind's place in this list is part of its seed.
+ALL_KINDS: tuple[str, ...] = (*KINDS, *SINGLE_CAUSES)
 #: Logs last this long, s; the robot never comes nearer than that to anything, m.
 _SHORTEST_S, _LONGEST_S, _LEAST_CLEAR_M = 58.0, 120.0, 0.27
 _ATTEMPTS = 400
@@ -49,7 +52,7 @@ class Incident:
     """One simulated log and what was done to it.
 
     Attributes:
-        kind: one of `KINDS`.
+        kind: one of `ALL_KINDS`.
         seed: the seed it was made from.
         recording: everything a log is made of.
         conditions: of `slamreplay.bench.conditions.CONDITIONS`.
@@ -67,16 +70,25 @@ def incident(kind: str, seed: int, conditions: tuple[str, ...] = ()) -> Incident
     Raises:
         UsageError: there is no such kind or condition.
     """
-    if kind not in KINDS:
-        raise UsageError(f"there is no kind of incident '{kind}'", hint=", ".join(KINDS))
+    return Incident(kind, seed, record(story_of(kind, seed, conditions)), conditions)
+
+
+def story_of(kind: str, seed: int, conditions: tuple[str, ...] = ()) -> Scenario:
+    """What is played in an incident.
+
+    Raises:
+        UsageError: there is no such kind or condition.
+    """
+    if kind not in ALL_KINDS:
+        raise UsageError(f"there is no kind of incident '{kind}'", hint=", ".join(ALL_KINDS))
     for name in conditions:
         if name not in CONDITIONS:
             raise UsageError(f"there is no condition '{name}'", hint=", ".join(CONDITIONS))
     for attempt in range(_ATTEMPTS):
-        rng = np.random.Generator(np.random.PCG64([seed, KINDS.index(kind), attempt]))
+        rng = np.random.Generator(np.random.PCG64([seed, ALL_KINDS.index(kind), attempt]))
         story = _story(kind, rng, conditions)
         if story is not None:
-            return Incident(kind, seed, record(story), conditions)
+            return story
     raise AssertionError(f"no {kind} incident of seed {seed} can be driven")
 
 
@@ -99,4 +111,7 @@ def _story(kind: str, rng: np.random.Generator, conditions: tuple[str, ...]) -> 
     many = kind == "people" or "crowd" in conditions
     n = int(rng.integers(12, 25)) if many else int(rng.integers(0, 4))
     people = crowd(floor, motion, n, rng)
-    return replace(story, walkers=people, seed=int(rng.integers(2**31)))
+    story = replace(story, walkers=people, seed=int(rng.integers(2**31)))
+    if kind == "vague_start":
+        return on_pitch(story, place.pitch_m or 0.0, rng)
+    return on_single(kind, story, motion, rng)

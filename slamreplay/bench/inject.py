@@ -139,7 +139,9 @@ def _whole(view: BundleView, name: str) -> Table:
 
 def _view_of(view: BundleView, tables: Mapping[str, Table], manifest: Manifest) -> BundleView:
     bundle = Bundle(manifest, tables, view.bundle.grids())
-    return BundleView(bundle, replaced_grid=view.replaced_grid, settings=view.settings)
+    return BundleView(
+        bundle, replaced_grid=view.replaced_grid, redrawn=view.redrawn, settings=view.settings
+    )
 
 
 def _closed(table: Table, start_ns: int, end_ns: int) -> Table:

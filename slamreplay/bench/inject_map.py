@@ -8,24 +8,19 @@ from numpy.typing import ArrayLike, NDArray
 from slamreplay.bench.injection import Box, Injection
 from slamreplay.bundle.view import BundleView
 from slamreplay.errors import UsageError
-from slamreplay.maps.grid import FREE, OCCUPIED, OccupancyGrid
-
-#: Unknown cells this near to walls that were taken off the map become free with them.
-_CLEARED_M = 0.5
+from slamreplay.maps.edits import with_walls, with_walls_moved, without_walls
+from slamreplay.maps.grid import OccupancyGrid
 
 
 def appeared(view: BundleView, box_m: Box) -> Injection:
     """The walls in a box are taken off the map: to the map, what stands there is new.
 
-    Unknown cells within half a metre of them become free too: a wall at the edge of the unknown
-    would contradict no map that merely ends there.
-
     Raises:
         UsageError: the box holds no mapped wall.
     """
-    grid, rows, cols = _walls(view, box_m)
-    edited = _with_cells(view, grid, _cleared(grid, rows, cols))
-    return Injection("appeared", edited, view.manifest.start_ns, _around(grid, rows, cols))
+    grid, walls = _walls(view, box_m)
+    edited = view.with_grid(without_walls(grid, walls))
+    return Injection("appeared", edited, view.manifest.start_ns, _around(grid, walls))
 
 
 def removed(view: BundleView, box_m: Box) -> Injection:
@@ -35,14 +30,11 @@ def removed(view: BundleView, box_m: Box) -> Injection:
         UsageError: the box holds no free cell.
     """
     grid = _grid(view)
-    inside = _inside(grid, box_m) & grid.free
-    if not inside.any():
+    cells = np.argwhere(_inside(grid, box_m) & grid.free)
+    if not len(cells):
         raise UsageError(f"the box {box_m} holds no free cell")
-    rows, cols = np.nonzero(inside)
-    cells = grid.cells.copy()
-    cells[rows, cols] = OCCUPIED
-    edited = _with_cells(view, grid, cells)
-    return Injection("removed", edited, view.manifest.start_ns, _around(grid, rows, cols))
+    edited = view.with_grid(with_walls(grid, cells))
+    return Injection("removed", edited, view.manifest.start_ns, _around(grid, cells))
 
 
 def moved(view: BundleView, box_m: Box, shift_xy_m: ArrayLike) -> Injection:
@@ -56,21 +48,16 @@ def moved(view: BundleView, box_m: Box, shift_xy_m: ArrayLike) -> Injection:
     Raises:
         UsageError: the box holds no mapped wall, or nothing of it stays on the map.
     """
-    grid, rows, cols = _walls(view, box_m)
-    centres = grid.centre_of(np.column_stack([rows, cols]))
-    target = grid.cell_of(centres + np.asarray(shift_xy_m, dtype=np.float64))
-    target = target[grid.inside(target)]
+    grid, walls = _walls(view, box_m)
+    edited, target = with_walls_moved(grid, walls, shift_xy_m)
     if not len(target):
         raise UsageError("the shift takes the walls off the map")
-    cells = _cleared(grid, rows, cols)
-    cells[target[:, 0], target[:, 1]] = OCCUPIED
-    edited = _with_cells(view, grid, cells)
     return Injection(
         "moved",
-        edited,
+        view.with_grid(edited),
         view.manifest.start_ns,
-        _around(grid, rows, cols),
-        _around(grid, target[:, 0], target[:, 1]),
+        _around(grid, walls),
+        _around(grid, target),
     )
 
 
@@ -88,38 +75,16 @@ def _inside(grid: OccupancyGrid, box_m: Box) -> NDArray[np.bool_]:
     return np.asarray(((xy >= low) & (xy <= high)).all(axis=1).reshape(grid.cells.shape))
 
 
-def _walls(
-    view: BundleView, box_m: Box
-) -> tuple[OccupancyGrid, NDArray[np.int64], NDArray[np.int64]]:
+def _walls(view: BundleView, box_m: Box) -> tuple[OccupancyGrid, NDArray[np.int64]]:
     grid = _grid(view)
-    rows, cols = np.nonzero(_inside(grid, box_m) & grid.occupied)
-    if not len(rows):
+    walls = np.argwhere(_inside(grid, box_m) & grid.occupied)
+    if not len(walls):
         raise UsageError(f"the box {box_m} holds no mapped wall")
-    return grid, rows, cols
+    return grid, walls
 
 
-def _cleared(
-    grid: OccupancyGrid, rows: NDArray[np.int64], cols: NDArray[np.int64]
-) -> NDArray[np.int8]:
-    """Cells without these walls, known to be free about where they were."""
-    from scipy.ndimage import distance_transform_edt
-
-    cells = grid.cells.copy()
-    walls = np.ones(cells.shape, dtype=bool)
-    walls[rows, cols] = False
-    near = distance_transform_edt(walls) * grid.resolution_m <= _CLEARED_M
-    cells[near & (cells < 0)] = FREE
-    cells[rows, cols] = FREE
-    return cells
-
-
-def _with_cells(view: BundleView, grid: OccupancyGrid, cells: NDArray[np.int8]) -> BundleView:
-    edited = OccupancyGrid(cells, grid.resolution_m, grid.origin_xyyaw, grid.frame_id)
-    return view.with_grid(edited)
-
-
-def _around(grid: OccupancyGrid, rows: NDArray[np.int64], cols: NDArray[np.int64]) -> Box:
-    xy = grid.centre_of(np.column_stack([rows, cols]))
+def _around(grid: OccupancyGrid, cells: NDArray[np.int64]) -> Box:
+    xy = grid.centre_of(cells)
     half = grid.resolution_m / 2
     (x0, y0), (x1, y1) = xy.min(axis=0) - half, xy.max(axis=0) + half
     return (float(x0), float(y0), float(x1), float(y1))

@@ -5,18 +5,16 @@ from __future__ import annotations
 import json
 import traceback
 from collections.abc import Callable, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
-import numba
 import numpy as np
 
 from slamreplay.bench.conditions import CONDITIONS
 from slamreplay.bench.failures import write_case
 from slamreplay.bench.incidents import KINDS
 from slamreplay.bench.measure import Measured, measured
+from slamreplay.bench.pool import played
 from slamreplay.bench.schedule import Case, Split, schedule
 from slamreplay.bench.scores import hindsight_size, is_right, named, scores
 from slamreplay.bench.store import fingerprint, read_measured, write_measured
@@ -69,7 +67,7 @@ def run_benchmark(
     todo = [c for c in cases if c not in done]
     say = progress or (lambda _what, _share: None)
     say(f"{len(done)} logs kept", len(done) / max(len(cases), 1))
-    for one in _judged(todo, jobs):
+    for one in played(todo, jobs, measured_or_failed):
         done[one.case] = one
         write_measured(folder, one, code)
         say(one.case.name, len(done) / len(cases))
@@ -126,19 +124,6 @@ def _write_reliability(target: Path, results: dict[str, Any]) -> None:
         figure = reliability_figure(record, canvas.BESIDE)
         if figure is not None:
             write_file(target / DIAGRAM, canvas.svg_bytes(figure))
-
-
-def _judged(cases: Sequence[Case], jobs: int) -> Any:
-    """Each case as it is done, from processes of their own: a fresh interpreter per worker."""
-    if jobs <= 1:
-        yield from (measured_or_failed(c) for c in cases)
-        return
-    # A process has one core to itself: threads within it would only stand in each other's way.
-    with ProcessPoolExecutor(
-        jobs, get_context("spawn"), initializer=numba.set_num_threads, initargs=(1,)
-    ) as pool:
-        for future in as_completed([pool.submit(measured_or_failed, c) for c in cases]):
-            yield future.result()
 
 
 def measured_or_failed(case: Case) -> Measured:

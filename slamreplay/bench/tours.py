@@ -45,7 +45,9 @@ def on_tour(kind: str, place: Place, floor: Floor, rng: np.random.Generator) -> 
         other = _far_from(at, 1.5, floor, rng)
         turn = rng.uniform(-0.5, 0.5) if rng.random() < 0.5 else rng.uniform(-np.pi, np.pi)
         return replace(story, believed_start=(*other, yaw + float(turn)))
-    return _one_aisle_off(story, place.pitch_m, floor, rng) if place.pitch_m else story
+    if kind == "identical_aisles" and place.pitch_m:
+        return _one_aisle_off(story, place.pitch_m, floor, rng)
+    return story
 
 
 def _one_aisle_off(

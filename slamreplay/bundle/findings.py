@@ -442,6 +442,24 @@ FINDINGS: dict[str, Explanation] = {
         "limit; those that are only inferred from motion do not count.",
         "Somebody may have stood in the way: people are no change of the map.",
     ),
+    "SR-LAT-001": Explanation(
+        "The pose was old when it was used",
+        "How far did the robot move between the moment of its pose and the use of that pose?",
+        "For each command of a controller, or plan, that came at a rate: its time minus the moment "
+        "that tf could answer for by then, the older of odometry's last stamp that had arrived and "
+        "the stamp of map -> odom. The motion in that time is odometry's; 0.2 m or 10 deg in one "
+        "of 20 are worth a word, beyond the limits of being lost a warning where somebody planned.",
+        "A message counts from when it was recorded; the robot had it a moment sooner or later. "
+        "Where stamps and log times are of two clocks, real ages are longer. A controller that "
+        "reads odometry alone is not late by what the localizer is.",
+    ),
+    "SR-LAT-002": Explanation(
+        "A control loop stalled while the robot moved",
+        "Did commands or plans that come at a rate fail to come while the robot moved on?",
+        "The longest interval after a command that asked for motion, five periods and 0.25 s or "
+        "longer, up to 2 s (20 periods); the motion in it is odometry's, judged as in SR-LAT-001.",
+        "A recorder that dropped messages looks the same; so does a person who let go of a stick.",
+    ),
     "SR-DAT-001": Explanation(
         "Parts of the replay bundle are missing",
         "Are odometry, IMU, scans, pose, covariance, map, costmap and recovery actions there?",

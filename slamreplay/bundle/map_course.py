@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -84,6 +84,17 @@ def map_course(updates: Table, kept: Sequence[str], start_ns: int, end_ns: int) 
         Held(name, first, last)
         for name, first, last in zip(names.tolist(), since.tolist(), until.tolist(), strict=True)
     )
+
+
+def renamed(course: Sequence[Held], new: Mapping[str, str]) -> tuple[Held, ...]:
+    """The course with other versions in place of some; what has become one version is one entry."""
+    found: list[Held] = []
+    for held in course:
+        held = replace(held, version=new.get(held.version, held.version))
+        if found and found[-1].version == held.version:
+            held = replace(found.pop(), end_ns=held.end_ns)
+        found.append(held)
+    return tuple(found)
 
 
 def map_stretches(

@@ -15,8 +15,23 @@ def odometry_track(view: BundleView) -> PoseTrack | None:
     """The base frame in the odom frame at every odometry sample, or None without odometry.
 
     From tf where the log has odom -> base on it, for that is what a localizer reads; else from the
-    odometry topic. The covariance is the topic's where the poses are.
+    odometry topic. The covariance is the topic's where the poses are. Worked out once for all views
+    that have it as recorded.
     """
+    track = view.shared("odometry by tf", ["transforms"], _tf_track)
+    if track is not None:
+        return track
+    return view.shared("odometry by topic", ["odometry", "transforms"], _topic_track)
+
+
+def odometry_tables(view: BundleView) -> list[str]:
+    """Names of the tables that the odometry depends on."""
+    if view.shared("odometry by tf", ["transforms"], _tf_track) is not None:
+        return ["transforms"]
+    return ["odometry", "transforms"]
+
+
+def _tf_track(view: BundleView) -> PoseTrack | None:
     frames = view.manifest.frames
     if frames.odom and frames.base and view.transforms.has_path(frames.odom, frames.base):
         path = view.transforms.path(frames.odom, frames.base)
@@ -29,6 +44,10 @@ def odometry_track(view: BundleView) -> PoseTrack | None:
             return PoseTrack.without_covariance(
                 frames.odom, frames.base, t_ns[valid][keep], xyyaw[keep]
             )
+    return None
+
+
+def _topic_track(view: BundleView) -> PoseTrack | None:
     table = view.role("odometry")
     return None if table is None or not len(table) else topic_track(view, table)
 

@@ -104,7 +104,45 @@ def scan_sets(view: BundleView) -> tuple[ScanSet, ...]:
     return tuple(found)
 
 
+@dataclass(frozen=True, eq=False)
+class _Returns:
+    """What depends on the scans alone, not on where the laser is; attributes as of `ScanSet`."""
+
+    frame_id: str
+    t_ns: NDArray[np.int64]
+    ranges_m: NDArray[np.float32]
+    angle_min: se2.Array
+    angle_increment: se2.Array
+    time_increment_s: se2.Array
+    hits: NDArray[np.bool_]
+    misses: NDArray[np.bool_]
+    range_max_m: se2.Array
+
+
 def _scans_of(view: BundleView, role: str, odometry: PoseTrack | None) -> ScanSet | None:
+    def decoded(alone: BundleView) -> _Returns | None:
+        return _returns(alone, role)
+
+    found = view.shared("scans", ["scans"], decoded, by=role)
+    if found is None:
+        return None
+    mount, upside_down = laser_mount(view, found.frame_id)
+    sign = -1.0 if upside_down else 1.0
+    return ScanSet(
+        found.t_ns,
+        found.ranges_m,
+        sign * found.angle_min,
+        sign * found.angle_increment,
+        found.time_increment_s,
+        found.hits,
+        found.misses,
+        found.range_max_m,
+        mount,
+        odometry,
+    )
+
+
+def _returns(view: BundleView, role: str) -> _Returns | None:
     table = view.role(role)
     if table is None or not len(table):
         return None
@@ -115,33 +153,57 @@ def _scans_of(view: BundleView, role: str, odometry: PoseTrack | None) -> ScanSe
     column = np.arange(len(ranges.values)) - np.repeat(ranges.offsets[:-1], ranges.lengths)
     matrix[np.repeat(np.arange(n), ranges.lengths), column] = ranges.values
     low, high = table["range_min_m"][:, None], table["range_max_m"][:, None]
-    with np.errstate(invalid="ignore"):
-        hits = np.isfinite(matrix) & (matrix > 0.0) & (matrix >= low) & (matrix <= high)
-    nothing = told_as_range_max(matrix, high)
-    mount, upside_down = _laser_mount(view, str(table["frame_id"][0]))
-    sign = -1.0 if upside_down else 1.0
-    return ScanSet(
+    hits, misses = hits_and_misses(matrix, low, high)
+    return _Returns(
+        str(table["frame_id"][0]),
         table.t_ns,
         matrix,
-        sign * table["angle_min_rad"],
-        sign * table["angle_increment_rad"],
+        table["angle_min_rad"],
+        table["angle_increment_rad"],
         table["time_increment_s"],
-        hits & ~nothing,
-        np.isposinf(matrix) | nothing,
+        hits,
+        misses,
         table["range_max_m"],
-        mount,
-        odometry,
     )
 
 
-def _laser_mount(view: BundleView, laser: str) -> tuple[se2.Array, bool]:
+def hits_and_misses(
+    ranges_m: NDArray[np.float32], range_min_m: se2.Array, range_max_m: se2.Array
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """(...) beams with a return in [range_min, range_max], and those that saw free space.
+
+    Args:
+        ranges_m: (...) of one laser, all its scans.
+        range_min_m: (...) of each range, or what broadcasts to it.
+        range_max_m: likewise.
+    """
+    with np.errstate(invalid="ignore"):
+        hits = np.isfinite(ranges_m) & (ranges_m > 0.0)
+        hits &= (ranges_m >= range_min_m) & (ranges_m <= range_max_m)
+    nothing = told_as_range_max(ranges_m, range_max_m)
+    return hits & ~nothing, np.isposinf(ranges_m) | nothing
+
+
+def laser_mount(view: BundleView, laser: str) -> tuple[se2.Array, bool]:
+    """(3,) a laser's pose on the robot, and whether it hangs upside down.
+
+    Upside down it is turned the right way up about its x axis: the bearings change their sign. A
+    frame that is not in tf sits at the base's origin.
+    """
+    T_base_laser = laser_transform(view, laser)
+    if T_base_laser is None:
+        return np.zeros(3), False
+    upside_down = bool(T_base_laser[2, 2] < 0.0)
+    if upside_down:
+        T_base_laser = T_base_laser @ np.diag([1.0, -1.0, -1.0, 1.0])
+    return se3.planar(T_base_laser), upside_down
+
+
+def laser_transform(view: BundleView, laser: str) -> se2.Array | None:
+    """T_base_laser (4, 4), of a moving mount an early one; None of a frame that is not in tf."""
     base = view.manifest.frames.base
     if not base or not view.transforms.has_path(base, laser):
-        return np.zeros(3), False
+        return None
     moving = [e.t_ns[-1:] for e in view.transforms.path(base, laser) if not e.is_static]
     at = np.min(moving, axis=0) if moving else np.zeros(1, dtype=np.int64)
-    T_base_laser, _ = view.transforms.lookup(base, laser, at)
-    upside_down = bool(T_base_laser[0, 2, 2] < 0.0)
-    if upside_down:  # turn it the right way up about its x axis; the bearings change their sign
-        T_base_laser = T_base_laser @ np.diag([1.0, -1.0, -1.0, 1.0])
-    return se3.planar(T_base_laser)[0], upside_down
+    return view.transforms.lookup(base, laser, at)[0][0]

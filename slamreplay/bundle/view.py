@@ -2,27 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Hashable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
+from typing import TypeVar
 
 import numpy as np
 import pyarrow.compute as pc
 
 from slamreplay.bundle.arrow import numbers_from_arrow
 from slamreplay.bundle.manifest import Manifest
-from slamreplay.bundle.map_course import Held, MapStretch, map_course, map_stretches
+from slamreplay.bundle.map_course import Held, MapStretch, map_course, map_stretches, renamed
 from slamreplay.bundle.placeholders import without_placeholders
 from slamreplay.bundle.role_tables import ROLE_TABLES
 from slamreplay.bundle.schema import JUDGING_KINDS, RELATIONS, SENSED_KINDS, TABLES
+from slamreplay.bundle.sharing import Shared
 from slamreplay.bundle.store import read_columns, read_grid, read_manifest, read_table
 from slamreplay.bundle.tables import Table
 from slamreplay.errors import UsageError
 from slamreplay.geometry.times import Times
 from slamreplay.geometry.transforms import Edge, TransformBuffer
 from slamreplay.maps.grid import OccupancyGrid
+
+T = TypeVar("T")
 
 
 def check_held_out(kinds: Collection[str]) -> None:
@@ -45,6 +49,9 @@ class Bundle:
         tables: tables in memory, by name; those on disk are read on demand.
         grids: maps in memory, by version.
         path: the folder on disk, None for a bundle that lives in memory only (tests, notebooks).
+
+    Attributes:
+        shared: what was worked out of its tables, for all views that have them as recorded.
     """
 
     def __init__(
@@ -60,6 +67,7 @@ class Bundle:
         self._evidence: dict[str, Table] = {}
         self._grids = dict(grids)
         self._stretches: dict[tuple[Held, ...], tuple[MapStretch, ...]] = {}
+        self.shared = Shared()
 
     @classmethod
     def open(cls, path: Path) -> Bundle:
@@ -149,18 +157,23 @@ class BundleView:
     Attributes:
         bundle: what lies beneath.
         tables: tables a perturbation has exchanged.
-        replaced_grid: a map a perturbation has exchanged.
+        replaced_grid: a map that holds all along, in place of those of the bundle.
+        redrawn: maps that stand for versions of the bundle, by these versions.
         settings: estimator settings a perturbation has changed, by name.
         held_out: kinds of references that are left out beside those that only judge.
         stretch: the part of the log that is looked at; None is all of it.
+        only: the tables that may be read, for work that is to depend on no other; None is all.
     """
 
     bundle: Bundle
     tables: Mapping[str, Table] = field(default_factory=lambda: MappingProxyType({}))
     replaced_grid: OccupancyGrid | None = None
+    redrawn: Mapping[str, OccupancyGrid] = field(default_factory=lambda: MappingProxyType({}))
     settings: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
     held_out: frozenset[str] = frozenset()
     stretch: MapStretch | None = None
+    only: frozenset[str] | None = None
+    _own: Shared = field(default_factory=Shared, repr=False)
 
     @property
     def manifest(self) -> Manifest:
@@ -169,6 +182,7 @@ class BundleView:
 
     def table(self, name: str) -> Table:
         """A table by name; of references only those the robot itself sensed."""
+        self._check_may_read(name)
         if name in self.tables:
             return self.tables[name]
         if name in ("references", RELATIONS):
@@ -177,6 +191,7 @@ class BundleView:
 
     def recorded(self, name: str) -> Table:
         """A table by name with its placeholders, for whoever asks what they are."""
+        self._check_may_read(name)
         if name in self.tables:
             return self.tables[name]
         if name == RELATIONS:
@@ -187,6 +202,39 @@ class BundleView:
                 ~np.isin(table["kind"].astype(str), sorted(JUDGING_KINDS | self.held_out))
             )
         return table
+
+    def _check_may_read(self, name: str) -> None:
+        if self.only is not None and name not in self.only:
+            raise AssertionError(f"what is made of {sorted(self.only)} alone reads {name}")
+
+    def shared(
+        self,
+        kind: str,
+        tables: Collection[str],
+        make: Callable[[BundleView], T],
+        *,
+        by: Hashable = (),
+    ) -> T:
+        """What `make` works out of some tables, once for all views that have these as recorded.
+
+        It is given a view with those tables alone, without a map of its own and without settings,
+        so that what it gives is the same bits whoever asked first. Nobody may change it.
+
+        Args:
+            kind: of the result.
+            tables: names of all that is read; not references, of which views differ in silence.
+            make: does the work.
+            by: what the result depends on beside the tables.
+        """
+        if {"references", RELATIONS} & set(tables):
+            raise AssertionError("references are not shared between views")
+        names = sorted(tables)
+        found = [self.table(name) for name in names]
+        place = self._own if any(name in self.tables for name in names) else self.bundle.shared
+        alone = replace(
+            self, only=frozenset(names), replaced_grid=None, settings=MappingProxyType({})
+        )
+        return place.of(kind, by, found, lambda: make(alone))
 
     def role(self, role: str) -> Table | None:
         """The rows of the topic that plays `role` in its table, or None where none does."""
@@ -206,17 +254,20 @@ class BundleView:
     @cached_property
     def map_course(self) -> tuple[Held, ...]:
         """The map versions that held, from the first to the last moment of the span."""
-        if self.stretch is not None:
-            return self.stretch.held
         if self.replaced_grid is not None:
             return (Held(self.replaced_grid.version, *self.span),)
-        return map_course(self.table("map_updates"), self.bundle.map_versions, *self.span)
+        if self.stretch is not None:
+            return self.stretch.held
+        held = map_course(self.table("map_updates"), self.bundle.map_versions, *self.span)
+        return renamed(held, {h.version: self._stands_for(h.version) for h in held})
 
     @cached_property
     def map_stretches(self) -> tuple[MapStretch, ...]:
         """The parts of the log over which the maps were of one place; none without a map."""
         if self.stretch is not None:
-            return (self.stretch,)
+            return (MapStretch(self.map_course),)
+        if self.redrawn:
+            return map_stretches(self.map_course, self.grid_of)
         return self.bundle.map_stretches(self.map_course)
 
     @cached_property
@@ -227,8 +278,9 @@ class BundleView:
 
     def grid_of(self, version: str) -> OccupancyGrid | None:
         """A map by its version, None where it is not there."""
-        if self.replaced_grid is not None and self.replaced_grid.version == version:
-            return self.replaced_grid
+        for grid in (self.replaced_grid, *self.redrawn.values()):
+            if grid is not None and grid.version == version:
+                return grid
         return self.bundle.grid(version)
 
     def within(self, stretch: MapStretch) -> BundleView:
@@ -242,18 +294,38 @@ class BundleView:
             tables[name] = self.table(name).take(own)
         return replace(self, tables={**self.tables, **tables}, stretch=stretch)
 
+    def _stands_for(self, recorded: str) -> str:
+        """The version that holds whenever a version of the bundle did."""
+        return self.redrawn[recorded].version if recorded in self.redrawn else recorded
+
     @cached_property
     def transforms(self) -> TransformBuffer:
         """The tf tree of this view."""
-        return TransformBuffer(edges_of(self.table("transforms")))
+        return self.shared(
+            "tf tree",
+            ["transforms"],
+            lambda view: TransformBuffer(edges_of(view.table("transforms"))),
+        )
 
     def with_table(self, table: Table) -> BundleView:
         """A view with one table exchanged."""
         return replace(self, tables={**self.tables, table.schema.name: table})
 
     def with_grid(self, grid: OccupancyGrid) -> BundleView:
-        """A view with the map exchanged."""
+        """A view in which one map holds all along."""
         return replace(self, replaced_grid=grid)
+
+    def with_grids(self, grids: Mapping[str, OccupancyGrid]) -> BundleView:
+        """A view with other maps in place of some that hold at some time, by their versions."""
+        if self.replaced_grid is not None:
+            return self.with_grid(grids.get(self.replaced_grid.version, self.replaced_grid))
+        redrawn = dict(self.redrawn)
+        for recorded in self.bundle.map_versions:
+            if self._stands_for(recorded) in grids:
+                redrawn[recorded] = grids[self._stands_for(recorded)]
+        new = {version: grid.version for version, grid in grids.items()}
+        stretch = None if self.stretch is None else MapStretch(renamed(self.stretch.held, new))
+        return replace(self, redrawn=redrawn, stretch=stretch)
 
     def with_setting(self, name: str, value: float) -> BundleView:
         """A view that asks estimators to run with one setting changed."""

@@ -14,13 +14,8 @@ def register(app: typer.Typer) -> None:
     """Add the command."""
     group = typer.Typer(help="Benchmarks on simulated logs of known truth.", rich_markup_mode=None)
     group.command("verdict")(verdict)
-    # A group of one command would otherwise run it without its name.
-    group.callback()(_group)
+    group.command("causes")(causes)
     app.add_typer(group, name="bench")
-
-
-def _group() -> None:
-    """Benchmarks on simulated logs of known truth."""
 
 
 def verdict(
@@ -94,6 +89,74 @@ def verdict(
         typer.echo(page(results))
         typer.echo(str(output / PAGE), err=True)
     lines = missed(results["scores"], goals)
+    for line in lines:
+        typer.echo(line, err=True)
+    if lines:
+        raise typer.Exit(1)
+
+
+def causes(
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="Folder to write.")],
+    seed: Seed = 0,
+    logs: Annotated[
+        int | None, typer.Option("--logs", min=1, help="How many logs; 230 by default.")
+    ] = None,
+    train: Annotated[
+        bool, typer.Option("--train", help="Play the seeds that are there to develop with.")
+    ] = False,
+    kind: Annotated[
+        list[str] | None, typer.Option("--kind", help="Only this kind; several by repeating it.")
+    ] = None,
+    by: Annotated[
+        list[str] | None,
+        typer.Option("--by", help="Who names the causes; all by default, several by repeating it."),
+    ] = None,
+    at_least: Annotated[
+        list[str] | None,
+        typer.Option("--at-least", metavar="FIGURE=NUMBER", help="Exit with 1 where it is lower."),
+    ] = None,
+    jobs: Annotated[int, typer.Option("--jobs", min=1, help="Processes.")] = 2,
+    as_json: Json = False,
+) -> None:
+    """Name the root causes of simulated incidents whose single cause is known.
+
+    Writes results.json, results.md, and the confusion matrix as a picture; a run that was stopped
+    goes on where it was. Held seeds are played unless --train is given. A FIGURE is a path into the
+    answerers of results.json, as rules.accuracy.
+    """
+    from slamreplay.bench.cause_answers import ANSWERERS
+    from slamreplay.bench.cause_runner import DEFAULT_LOGS, run_causes
+    from slamreplay.bench.cause_table import causes_page
+    from slamreplay.bench.goals import missed, parse_goals
+    from slamreplay.bench.incidents import ALL_KINDS
+    from slamreplay.bench.runner import PAGE
+    from slamreplay.cli.progress import progress_bar
+    from slamreplay.errors import UsageError
+
+    for given, known in ((kind, ALL_KINDS), (by, tuple(ANSWERERS))):
+        for name in given or ():
+            if name not in known:
+                raise UsageError(f"there is no '{name}'", hint=", ".join(known))
+    goals = parse_goals(at_least or [], ">=")
+    with progress_bar("benchmark") as progress:
+        results = run_causes(
+            output,
+            logs=logs or DEFAULT_LOGS,
+            seed=seed,
+            split="train" if train else "held",
+            kinds=kind or ALL_KINDS,
+            answerers=by or tuple(ANSWERERS),
+            jobs=jobs,
+            progress=progress,
+        )
+    if as_json:
+        import json
+
+        typer.echo(json.dumps(results["answerers"], indent=1, allow_nan=False, sort_keys=True))
+    else:
+        typer.echo(causes_page(results))
+        typer.echo(str(output / PAGE), err=True)
+    lines = missed(results["answerers"], goals)
     for line in lines:
         typer.echo(line, err=True)
     if lines:

@@ -12,28 +12,34 @@ from slamreplay.errors import UsageError
 
 if TYPE_CHECKING:
     from slamreplay.labs.lab import ResultTable
+    from slamreplay.recipes import LabRecipe
 
 
 def run_lab(
-    path: Path, output: Path, *, seed: int | None, given: Sequence[str], as_json: bool
+    recipe: LabRecipe,
+    path: Path,
+    output: Path,
+    *,
+    seed: int | None,
+    given: Sequence[str],
+    as_json: bool,
 ) -> None:
     """Answer a recipe's question.
 
     Args:
-        path: the recipe.
+        recipe: the question.
+        path: its file, for faults.
         output: folder to write.
         seed: in place of the recipe's own.
         given: names of arguments and options of the command line that only a log can take.
         as_json: print the results as JSON.
 
     Raises:
-        UsageError: a recipe that cannot be read, or a log given to a lab.
+        UsageError: a log given to a lab, or a seed that is none.
     """
     from slamreplay.cli.progress import progress_bar
     from slamreplay.labs.folder import check_results_target, results_json, write_results
-    from slamreplay.recipes import read_recipe
 
-    recipe = read_recipe(path)
     if given:
         raise UsageError(
             f"the lab {recipe.lab} simulates what it needs: it takes no {', '.join(given)}",

@@ -75,7 +75,11 @@ def ingest_options(
 
 @contextmanager
 def evidence(
-    logs: Sequence[Path], options: IngestOptions, *, keep: Path | None = None
+    logs: Sequence[Path],
+    options: IngestOptions,
+    *,
+    keep: Path | None = None,
+    cache: Path | None = None,
 ) -> Iterator[Bundle]:
     """The bundle behind a command's LOG argument; a raw log is ingested on the way.
 
@@ -83,6 +87,8 @@ def evidence(
         logs: a bundle, or the files of one log.
         options: how to ingest; a bundle was ingested already and takes none.
         keep: where the bundle of a raw log is written; by default it lives as long as the block.
+        cache: folder of bundles, where that of a raw log is looked for and kept instead; one that
+            cannot be written is not used.
 
     Raises:
         UsageError: options that only a raw log can take, given with a bundle.
@@ -102,7 +108,24 @@ def evidence(
             )
         yield Bundle.open(logs[0])
         return
+    if cache is not None:
+        found = _kept(logs, options, cache)
+        if found is not None:
+            yield found
+            return
     with TemporaryDirectory(prefix="slamreplay-") as folder:
         with progress_bar("reading") as progress:
             bundle = ingest(logs, keep or Path(folder) / "log.bundle", options, progress=progress)
         yield bundle
+
+
+def _kept(logs: Sequence[Path], options: IngestOptions, cache: Path) -> Bundle | None:
+    from slamreplay.cli.progress import progress_bar
+    from slamreplay.errors import OutputError
+    from slamreplay.ingest.bundle_cache import ingest_once
+
+    try:
+        with progress_bar("reading") as progress:
+            return ingest_once(logs, cache, options, progress=progress)
+    except (OSError, OutputError):
+        return None

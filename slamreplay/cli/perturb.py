@@ -39,7 +39,7 @@ Logs = Annotated[
     list[Path] | None,
     typer.Argument(
         metavar="LOG",
-        help="Log or bundle, as of the other commands; none with a recipe that is a lab.",
+        help="Log or bundle, as of the other commands; none with a recipe that simulates its own.",
         show_default=False,
     ),
 ]
@@ -50,7 +50,10 @@ Recipe = Annotated[
 Output = Annotated[Path, typer.Option("-o", "--output", metavar="RUNS", help="Folder to write.")]
 Seed = Annotated[
     int | None,
-    typer.Option("--seed", help="Seed of every random number; 0, or the recipe's own."),
+    typer.Option(
+        "--seed",
+        help="Seed of every random number, the first one of several; 0, or the recipe's own.",
+    ),
 ]
 
 _POSES = (("poses", "rows_with_pose"),)
@@ -99,11 +102,15 @@ def perturb(
     """Run estimators on a log: each by itself, then with one perturbation at a time.
 
     The table shows how far each run is from the undisturbed run of the same estimator. A recipe
-    that is a lab simulates what it needs, takes no LOG and writes its answer to the folder.
+    that is a design says which levels of which perturbations are tried, or searches for the level
+    at which an estimator breaks; its answer lies beside the runs. One that is a lab simulates what
+    it needs, takes no LOG and writes its answer to the folder.
     """
     if recipe is not None:
         from slamreplay.cli.lab import run_lab
+        from slamreplay.recipes import LabRecipe, read_recipe
 
+        asked = read_recipe(recipe)
         only_logs = {
             "LOG": logs,
             "--perturbation": perturbations,
@@ -117,7 +124,33 @@ def perturb(
             "--end": end_s,
         }
         foreign = [name for name, value in only_logs.items() if value not in (None, [])]
-        run_lab(recipe, output, seed=seed, given=foreign, as_json=as_json)
+        if isinstance(asked, LabRecipe):
+            run_lab(asked, recipe, output, seed=seed, given=foreign, as_json=as_json)
+            return
+        from slamreplay.cli.dose import run_design
+
+        if perturbations:
+            raise UsageError("the recipe says what is perturbed: it takes no --perturbation",
+                             where=recipe, hint="leave it out")  # fmt: skip
+        run_design(
+            asked,
+            recipe,
+            output,
+            logs=logs or (),
+            how=options.ingest_options(
+                map_yaml=map_yaml,
+                topics=topics,
+                robot=robot,
+                reference=reference,
+                start_s=start_s,
+                end_s=end_s,
+            ),
+            estimators=estimators or (),
+            parameters=parameters or (),
+            robot=robot,
+            seed=seed,
+            as_json=as_json,
+        )
         return
     if not logs:
         raise UsageError("there is no LOG to replay", hint="name one, or a lab with --recipe")
@@ -150,7 +183,7 @@ def perturb(
         start_s=start_s,
         end_s=end_s,
     )
-    with options.evidence(logs, how) as bundle:
+    with options.evidence(logs, how, cache=cache_folder() / "bundles") as bundle:
         names = estimators or usual_estimators(bundle)
         trials = design(bundle, names, perturbations or (), seed or 0, given.of)
         with progress_bar("replaying") as progress:

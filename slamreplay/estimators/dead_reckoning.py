@@ -12,7 +12,8 @@ from slamreplay.bundle.scans import scan_set
 from slamreplay.bundle.track import PoseTrack
 from slamreplay.bundle.view import BundleView
 from slamreplay.estimators.inputs import need_odometry
-from slamreplay.estimators.start import OFFSET, ROTATE, Start, starts
+from slamreplay.estimators.scales import PROCESS_NOISE, scales_of
+from slamreplay.estimators.start import MOVED, Start, starts
 from slamreplay.geometry import se2
 
 
@@ -36,7 +37,7 @@ class DeadReckoning:
 
     name: ClassVar[str] = "dead_reckoning"
     needs: ClassVar[frozenset[str]] = frozenset({"odometry"})
-    settings: ClassVar[frozenset[str]] = frozenset({OFFSET, ROTATE})
+    settings: ClassVar[frozenset[str]] = MOVED | {PROCESS_NOISE}
 
     def told(self, scale: float) -> DeadReckoning:
         """The same one, told standard deviations of `scale` times these."""
@@ -55,6 +56,7 @@ class DeadReckoning:
         Raises:
             NotApplicableError: the log has no odometry.
         """
+        told = self.told(float(np.sqrt(scales_of(view)[0])))
         odometry = need_odometry(view, self.name)
         scans = scan_set(view)
         t_ns = odometry.t_ns if scans is None else scans.t_ns
@@ -70,7 +72,7 @@ class DeadReckoning:
         cov = np.full((len(t_ns), 3, 3), np.nan)
         known = np.isfinite(xyyaw).all(axis=1)
         if known.any():
-            cov[known] = self._covariance(odometry, T_map_odom, t_ns[start.row], start, t_ns[known])
+            cov[known] = told._covariance(odometry, T_map_odom, t_ns[start.row], start, t_ns[known])
         child = view.manifest.frames.base or odometry.child_frame_id
         return Estimate(PoseTrack(frame, child, t_ns, xyyaw, cov), _steps(frame, t_ns, xyyaw))
 

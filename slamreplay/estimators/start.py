@@ -16,14 +16,20 @@ from slamreplay.bundle.track import PoseTrack
 from slamreplay.bundle.view import BundleView
 from slamreplay.errors import NotApplicableError
 from slamreplay.geometry import se2, se3
-from slamreplay.geometry.covariance import planar_from_ros
+from slamreplay.geometry.covariance import ANY_ANGLE, planar_from_ros
 
 #: nav2_amcl's covariance of a start whose own is unknown: 0.5 m, 0.5 m, 15 deg.
 DEFAULT_COV = np.diag([0.25, 0.25, (np.pi / 12.0) ** 2])
 
-#: Settings a perturbation may change: metres ahead along the start's heading, radians to the left,
+#: Settings a perturbation may change: metres ahead along the start's heading and to the left of it,
+#: radians to the left, the standard deviation that its place is told with beside its own, m,
+OFFSET, LEFT = "initial_pose_offset_m", "initial_pose_left_m"
+ROTATE, SIGMA = "initial_pose_rotate_rad", "initial_pose_sigma_m"
+MOVED = frozenset({OFFSET, LEFT, ROTATE, SIGMA})
 #: and 1 for a start that knows nothing.
-OFFSET, ROTATE, GLOBAL = "initial_pose_offset_m", "initial_pose_rotate_rad", "initial_pose_global"
+GLOBAL = "initial_pose_global"
+#: What a clicked start is told with: 15 deg where its place is told to 0.5 m.
+RAD_PER_M = np.radians(15.0) / 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +66,7 @@ def starts(
     """
     rows = np.flatnonzero(np.isfinite(T_odom_base).all(axis=1))
     found = _given(view, t_ns, T_odom_base, rows)
-    belief = recorded_belief(view, t_ns[rows]) if told is None else None
+    belief = recorded_belief(_undisturbed(view), t_ns[rows]) if told is None else None
     if told is not None and len(rows) and (not found or rows[0] < found[0].row):
         found.insert(0, Start(int(rows[0]), *told))
     if belief is not None and belief.has_pose.any():
@@ -71,7 +77,7 @@ def starts(
         found[0] = _perturbed(found[0], view)
     elif view.settings.get(GLOBAL) and len(rows):
         found = [Start(int(rows[0]), None, DEFAULT_COV)]
-    elif OFFSET in view.settings or ROTATE in view.settings:
+    elif not MOVED.isdisjoint(view.settings):
         raise NotApplicableError("the log has no start that could be moved")
     return found
 
@@ -114,7 +120,14 @@ def _sound(cov: se2.Array) -> se2.Array:
 def _perturbed(start: Start, view: BundleView) -> Start:
     if view.settings.get(GLOBAL):
         return Start(start.row, None, start.cov)
-    off = np.array([view.settings.get(OFFSET, 0.0), 0.0, view.settings.get(ROTATE, 0.0)])
-    if start.xyyaw is None or not off.any():
+    off = np.array([view.settings.get(name, 0.0) for name in (OFFSET, LEFT, ROTATE)])
+    sigma = view.settings.get(SIGMA, 0.0)
+    if start.xyyaw is None or not (off.any() or sigma):
         return start
-    return Start(start.row, se2.compose(start.xyyaw, off), start.cov)
+    more = np.diag([sigma**2, sigma**2, min((RAD_PER_M * sigma) ** 2, ANY_ANGLE)])
+    return Start(start.row, se2.compose(start.xyyaw, off), start.cov + more)
+
+
+def _undisturbed(view: BundleView) -> BundleView:
+    """The log as it was: odometry that is changed must not move the start as well."""
+    return BundleView(view.bundle, held_out=view.held_out, stretch=view.stretch)

@@ -134,10 +134,14 @@ def quaternion_from_rpy(roll: ArrayLike, pitch: ArrayLike, yaw: ArrayLike) -> Ar
     )
 
 
-def yawed(quaternion_xyzw: ArrayLike, yaw: float) -> Array:
-    """Quaternions (N, 4) after a turn by `yaw` rad about the parent's z axis: q_yaw q."""
+def yawed(quaternion_xyzw: ArrayLike, yaw: ArrayLike) -> Array:
+    """Quaternions (N, 4) after turns by `yaw` (N,), or one for all, rad about the parent's z axis.
+
+    That is q_yaw q.
+    """
     x, y, z, w = np.asarray(quaternion_xyzw, dtype=np.float64).T
-    c, s = np.cos(yaw / 2.0), np.sin(yaw / 2.0)
+    half = np.asarray(yaw, dtype=np.float64) / 2.0
+    c, s = np.cos(half), np.sin(half)
     return np.column_stack([c * x - s * y, c * y + s * x, c * z + s * w, c * w - s * z])
 
 

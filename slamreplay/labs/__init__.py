@@ -13,6 +13,8 @@ LABS = Registry(
         "false_closures": "slamreplay.labs.false_closures.lab:FalseClosures",
         "interval_calibration": "slamreplay.labs.interval_calibration.lab:IntervalCalibration",
         "joint_estimation": "slamreplay.labs.joint_estimation.lab:JointEstimation",
+        "lost_or_changed": "slamreplay.labs.lost_or_changed.lab:LostOrChanged",
+        "minimum_replay": "slamreplay.labs.minimum_replay.lab:MinimumReplay",
         "two_run": "slamreplay.labs.two_run.lab:TwoRun",
         "wheel_slip": "slamreplay.labs.wheel_slip.lab:WheelSlip",
     },

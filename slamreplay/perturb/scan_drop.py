@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from slamreplay.bundle.view import BundleView
 from slamreplay.errors import NotApplicableError
@@ -17,8 +18,8 @@ from slamreplay.perturb.variant import Variant, check_level
 class ScanDrop:
     """Leave out scans of the laser that plays the scan role.
 
-    A higher ratio with the same seed drops the same scans and more; a longer burst contains the
-    shorter one.
+    A higher ratio with the same seed drops the same scans and more where they are drawn at random;
+    a longer burst contains the shorter one.
     """
 
     name: ClassVar[str] = "scan_drop"
@@ -26,6 +27,13 @@ class ScanDrop:
         "random": Variant("ratio", 0.0, "each scan is lost with this probability", 0, 0.999),
         "burst": Variant("s", 0.0, "no scan for this long, at a moment the seed chooses", 0, 3600),
         "even": Variant("ratio", 0.0, "this share of the scans is lost, evenly spread", 0, 0.999),
+        "nth": Variant(
+            "ratio",
+            0.0,
+            "at 1/n each n-th scan is lost, at 1 - 1/n only each n-th comes; else the nearest",
+            0,
+            0.999,
+        ),
     }
     touches: ClassVar[frozenset[str]] = frozenset({"scans"})
 
@@ -50,6 +58,8 @@ class ScanDrop:
         elif variant == "even":
             counted = np.floor((np.arange(len(rows) + 1)) * level)
             drop = np.diff(counted) > 0
+        elif variant == "nth":
+            drop = _every_nth(len(rows), level)
         else:
             t_ns = table.t_ns[rows]
             spare = int(t_ns[-1] - t_ns[0]) - ns(level)
@@ -60,3 +70,12 @@ class ScanDrop:
         keep = np.ones(len(table), dtype=bool)
         keep[rows[drop]] = False
         return view.with_table(table.take(keep))
+
+
+def _every_nth(count: int, level: float) -> NDArray[np.bool_]:
+    """(N,) which of so many scans are lost where the pattern has a whole period."""
+    share = min(level, 1.0 - level)
+    around = (np.floor(1.0 / share), np.ceil(1.0 / share))
+    n = max(2.0, min(around, key=lambda n: abs(1.0 / n - share)))
+    is_nth = (np.arange(count) + 1) % n == 0
+    return is_nth if level <= 0.5 else ~is_nth

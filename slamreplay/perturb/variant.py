@@ -20,6 +20,7 @@ class Variant:
         doc: what the level does, as one line.
         low: least level that makes sense.
         high: greatest one.
+        is_switch: whether it is either left alone (0) or done (1), with nothing between.
     """
 
     unit: Literal["s", "m", "deg", "ratio"]
@@ -27,13 +28,20 @@ class Variant:
     doc: str
     low: float = 0.0
     high: float = float("inf")
+    is_switch: bool = False
+
+
+def switch(doc: str) -> Variant:
+    """A variant that is either left alone, 0, or done, 1."""
+    return Variant("ratio", 0.0, doc, 0, 1, is_switch=True)
 
 
 def check_level(name: str, variants: Mapping[str, Variant], variant: str, level: float) -> Variant:
     """The variant, if it exists and the level is one it can take.
 
     Raises:
-        UsageError: no such variant, or a level that is no number or out of range.
+        UsageError: no such variant, or a level that is no number, out of range, or between the two
+            of a switch.
     """
     if variant not in variants:
         hint = f"there are: {', '.join(f'{name}.{v}' for v in variants)}"
@@ -42,4 +50,8 @@ def check_level(name: str, variants: Mapping[str, Variant], variant: str, level:
     if not (isfinite(level) and found.low <= level <= found.high):
         to = f"{found.low:g} to {found.high:g}" if isfinite(found.high) else f"{found.low:g} up"
         raise UsageError(f"level {level:g} of '{name}.{variant}' is not in {to} {found.unit}")
+    if found.is_switch and level not in (0.0, 1.0):
+        raise UsageError(
+            f"level {level:g} of '{name}.{variant}' is neither 0 nor 1", hint="it is off or on"
+        )
     return found

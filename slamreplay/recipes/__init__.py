@@ -1,5 +1,7 @@
 """Recipes: one question each, as a YAML file that says all its answer rests on."""
 
-from slamreplay.recipes.recipe import LabRecipe, read_recipe
+from slamreplay.recipes.dose_recipe import DoseRecipe
+from slamreplay.recipes.lab_recipe import LabRecipe
+from slamreplay.recipes.recipe import Recipe, read_recipe
 
-__all__ = ["LabRecipe", "read_recipe"]
+__all__ = ["DoseRecipe", "LabRecipe", "Recipe", "read_recipe"]

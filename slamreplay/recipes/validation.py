@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any, TypeVar, get_args
 
 from pydantic import BaseModel, ValidationError
+from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
 from slamreplay.errors import UsageError
@@ -38,6 +39,16 @@ def validated(model: type[Model], given: Mapping[str, Any], path: Path, under: s
         raise UsageError(what + more, where=path, hint=hint) from error
 
 
+def one_line(key: str, text: str, path: Path) -> None:
+    """Refuse a text that is printed as a line and is none.
+
+    Raises:
+        UsageError: it has line breaks, or blanks that would not be seen.
+    """
+    if " ".join(text.split()) != text:
+        raise UsageError(f"'{key}' is not one line of text", where=path)
+
+
 def unknown_key(key: str, keys: Iterable[str]) -> tuple[str, str]:
     """What is wrong with a key that there is not, and the nearest there is."""
     return f"there is no key {key[:80]!r}", nearest(key.rpartition(".")[2], sorted(keys))
@@ -47,7 +58,7 @@ def _told(fault: ErrorDetails, model: type[BaseModel], under: str) -> tuple[str,
     """What is wrong, and what could be done about it."""
     key = ".".join(map(str, (under, *fault["loc"]) if under else fault["loc"]))
     if fault["type"] == "extra_forbidden":
-        return unknown_key(key, _model_at(model, fault["loc"][:-1]).model_fields)
+        return unknown_key(key, _keys(_model_at(model, fault["loc"][:-1])))
     if fault["type"] == "missing":
         return f"the key '{key}' is missing", None
     message = fault["msg"].removeprefix("Value error, ").removeprefix("Input ")
@@ -61,10 +72,15 @@ def _told(fault: ErrorDetails, model: type[BaseModel], under: str) -> tuple[str,
 def _model_at(model: type[BaseModel], where: Sequence[int | str]) -> type[BaseModel]:
     """The model that holds the key at a place: down the fields, through lists and unions."""
     for name in where:
-        field = model.model_fields.get(str(name))
+        field = _keys(model).get(str(name))
         if field is not None:  # else the index of a list
             model = _inner_model(field.annotation) or model
     return model
+
+
+def _keys(model: type[BaseModel]) -> dict[str, FieldInfo]:
+    """Fields by the key that they have in a file."""
+    return {field.alias or name: field for name, field in model.model_fields.items()}
 
 
 def _inner_model(annotation: Any) -> type[BaseModel] | None:

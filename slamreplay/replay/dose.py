@@ -6,8 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
-#: What became of a search: crossed; whole up to the last level; broken at the baseline already.
-Outcome = Literal["crossed", "never", "always", "not_applicable"]
+#: What became of a search: half of the seeds or more crossed; fewer did; none did, up to the last
+#: level; half or more are beyond the limit undisturbed already; no seed has such a number.
+Outcome = Literal["crossed", "partly", "never", "always", "not_applicable"]
 
 
 @dataclass(frozen=True)
@@ -26,34 +27,57 @@ class Limit:
 
 
 @dataclass(frozen=True)
+class Paired:
+    """A level against the baseline of the same seed.
+
+    Attributes:
+        mean: over the seeds, of with minus without.
+        low: end of its 95 % confidence interval; None below two seeds.
+        high: the other end.
+        n: seeds that have both numbers.
+    """
+
+    mean: float
+    low: float | None
+    high: float | None
+    n: int
+
+
+@dataclass(frozen=True)
 class Response:
     """What one level did, over the seeds.
 
     Attributes:
         level: in the perturbation's unit.
-        values: by metric, one number per seed; None where a seed has no such number.
-        paired: by metric, mean over the seeds of this level minus the baseline of the same seed,
-            and the ends of its 95 % confidence interval; ends are None with a single seed.
+        values: by metric, one number per seed of the curve; None where a seed has no such number,
+            or was not asked at this level: each goes its own way in a search.
+        paired: by metric, the differences from the baseline; none at the baseline itself.
     """
 
     level: float
     values: Mapping[str, tuple[float | None, ...]]
-    paired: Mapping[str, tuple[float, float | None, float | None]]
+    paired: Mapping[str, Paired]
 
 
 @dataclass(frozen=True)
 class Critical:
     """The level at which one metric crosses its limit.
 
+    A level is what was tried: the least that was seen broken, never one between two.
+
     Attributes:
         metric: whose limit.
         outcome: what was found.
-        level: median over the seeds that crossed; None where it was not crossed.
-        low: end of the 95 % interval over seeds, in the direction of the baseline; never tighter
-            than the bracket the search ended with.
-        high: the other end.
+        level: least level at which half of the seeds or more had crossed, None where fewer did.
+        low: end of the interval towards the baseline: over seeds the interval of the median with
+            `confidence`, of a single seed the last level that held. Never tighter than the bracket
+            the search ended with. None where `outcome` is not_applicable.
+        high: the other end; None where it lies beyond the last level.
         crossed: seeds that crossed.
         seeds: seeds that were asked.
+        confidence: with which the interval covers the median over seeds, as a share: 0.95 or more,
+            and less where there are too few of them for that. None of a single seed, which has a
+            bracket and no spread.
     """
 
     metric: str
@@ -63,6 +87,7 @@ class Critical:
     high: float | None
     crossed: int
     seeds: int
+    confidence: float | None
 
 
 @dataclass(frozen=True)
@@ -74,9 +99,15 @@ class DoseCurve:
         perturbation: `NAME.VARIANT`.
         unit: of the levels.
         baseline: the level that changes nothing.
+        by_factor: whether levels are spaced by factors, as an axis that shows them should be.
+        judged_by: what its errors are measured against.
+        seeds: of its values: one where nothing in its trials is drawn at random.
+        is_random: whether anything is.
         responses: by growing distance from the baseline, the baseline itself first.
         critical: one per limit, in the design's order.
-        broke_first: metric whose limit is crossed at the least level, None where none is.
+        broke_first: metric whose limit is crossed at the least level, None where none is; of
+            several at one level the first in the design's order.
+        notes: what a reader of its numbers must know, as sentences.
         reason: why there is no curve; empty where there is one.
     """
 
@@ -84,9 +115,14 @@ class DoseCurve:
     perturbation: str
     unit: str
     baseline: float
+    by_factor: bool
+    judged_by: str
+    seeds: tuple[int, ...]
+    is_random: bool
     responses: tuple[Response, ...]
     critical: tuple[Critical, ...]
     broke_first: str | None
+    notes: tuple[str, ...] = ()
     reason: str = ""
 
 
@@ -121,7 +157,8 @@ class DoseResults:
     Attributes:
         question: one sentence.
         seeds: that were used.
-        judged_by: what errors are measured against: a kind of reference, hindsight or the baseline.
+        judged_by: what errors are measured against: a kind of reference, hindsight or baseline;
+            of estimators that differ in it all of them, by ", ".
         limits: what counts as broken; the first is the one that is searched for.
         curves: by perturbation, then estimator, in the design's order.
         controls: of every estimator.

@@ -5,8 +5,9 @@ from __future__ import annotations
 import json
 import os
 import shutil
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 
 from slamreplay.bundle.atomic import atomic_folder
 from slamreplay.bundle.run import Run, Trial, read_run, run_bytes
@@ -18,7 +19,12 @@ RUNS_FORMAT = 1
 
 
 def write_runs(
-    target: Path, bundle: Bundle, runs: Sequence[Run], *, keep_bundle: bool = False
+    target: Path,
+    bundle: Bundle,
+    runs: Sequence[Run],
+    *,
+    keep_bundle: bool = False,
+    beside: Mapping[str, bytes] = MappingProxyType({}),
 ) -> None:
     """Write runs so that the folder is whole or absent.
 
@@ -28,6 +34,7 @@ def write_runs(
         runs: in the order of their trials.
         keep_bundle: copy the bundle to `target/bundle`, for one that would else be gone; without
             it `runs.json` holds the relative path to it.
+        beside: further files by name.
 
     Raises:
         OutputError: somebody else's folder, one that cannot be written, or a bundle that was
@@ -53,6 +60,8 @@ def write_runs(
             (work / "runs" / f"{run.trial.id}.npz").write_bytes(run_bytes(run))
         if keep_bundle:
             shutil.copytree(source, work / "bundle")
+        for name, content in beside.items():
+            (work / name).write_bytes(content)
         text = json.dumps(head, indent=1, allow_nan=False)
         (work / RUNS).write_text(text + "\n", encoding="utf-8")
 

@@ -2,161 +2,137 @@
 
 from __future__ import annotations
 
-import hashlib
-import inspect
-import json
-from collections.abc import Callable, Iterable, Sequence
-from functools import cache as once
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import Any
+from time import monotonic
+from types import TracebackType
+from typing import Self
 
-import numpy as np
+from slamreplay.bundle.run import Run, Trial
+from slamreplay.bundle.view import Bundle
+from slamreplay.errors import UsageError
+from slamreplay.replay.forecast import Forecast
+from slamreplay.replay.one_trial import run_trial
+from slamreplay.replay.parallel import Ended, Workers, worth_workers
+from slamreplay.replay.run_cache import cached_run, keep_run
 
-import slamreplay
-from slamreplay.bundle.atomic import write_file
-from slamreplay.bundle.run import Run, Trial, read_run, run_bytes
-from slamreplay.bundle.view import Bundle, BundleView
-from slamreplay.errors import BundleError, NotApplicableError, OutputError, UsageError
-from slamreplay.estimators import ESTIMATORS
-from slamreplay.perturb import PERTURBATIONS
-from slamreplay.replay.parallel import run_each, worth_workers
-from slamreplay.replay.parameters import configured
+__all__ = ["Replayer", "replay", "run_trial"]
 
-#: Random numbers of the perturbation do not depend on how many the estimator draws.
-_PERTURBATION_STREAM = 1
-#: Packages whose code an estimate depends on.
-_CODE = ("geometry", "maps", "matching", "graph", "bundle", "perturb", "estimators", "replay")
+#: Told what is being done, and the share of the work that is done.
+Progress = Callable[[str, float], None]
 
 
 def replay(
     bundle: Bundle,
     trials: Sequence[Trial],
     *,
-    progress: Callable[[str, float], None] | None = None,
+    progress: Progress | None = None,
     cache: Path | None = None,
     workers: int | None = None,
 ) -> list[Run]:
-    """A run for each trial, in their order.
+    """A run for each trial, in their order; of one round of trials, else as of `Replayer`."""
+    with Replayer(bundle, progress=progress, cache=cache, workers=workers) as replayer:
+        return replayer.replay(trials)
 
-    A trial that the log or the estimator does not allow gives a run without an estimate that says
-    why.
+
+class Replayer:
+    """Does trials of one bundle, round after round, with the same workers.
+
+    Use it as a context: `with Replayer(bundle, cache=folder) as replayer: replayer.replay(trials)`.
 
     Args:
         bundle: the evidence.
-        trials: of this bundle.
-        progress: told what is being done, and the share done.
-        cache: folder of earlier runs; one that cannot be written is not used.
+        progress: told what is being done, and the share done of the round, weighed by how long
+            trials take; what comes from the cache is no part of it.
+        cache: folder of earlier runs; one that cannot be written is not used. Every run is there as
+            soon as it is done: after a kill the same trials go on from where they were.
         workers: processes that share the trials, one per core by default; a short log and a bundle
             that is not on disk are done in this one. Runs are the same bit by bit.
-
-    Raises:
-        UsageError: a trial is of another bundle, or names what does not exist, or has parameters
-            that its estimator does not take.
     """
-    for trial in trials:
-        if trial.bundle_id != bundle.manifest.bundle_id:
-            raise UsageError(f"trial {trial.id} is of another bundle", where=trial.bundle_id)
-    cache = None if bundle.path is None else cache
-    known = {trial: _from_cache(trial, cache) for trial in trials}
-    runs = {trial: run for trial, run in known.items() if run is not None}
-    pending = [trial for trial in dict.fromkeys(trials) if trial not in runs]
-    workers = worth_workers(bundle, pending) if workers is None else workers
-    found: Iterable[tuple[Trial, Run | None]] = ((trial, None) for trial in pending)
-    if workers > 1 and bundle.path is not None:
-        found = run_each(bundle.path, pending, cache, workers)
-    tell = progress or (lambda words, share: None)  # noqa: ARG005 - nobody listens
-    if pending:
-        tell(_words(pending[0]), len(runs) / len(trials))
-    for trial, run in found:  # what no worker did is done here, where its fault shows
-        runs[trial] = into_cache(bundle, trial, cache) if run is None else run
-        tell(_words(trial), len(runs) / len(trials))
-    tell("replayed", 1.0)
-    return [runs[trial] for trial in trials]
 
+    def __init__(
+        self,
+        bundle: Bundle,
+        *,
+        progress: Progress | None = None,
+        cache: Path | None = None,
+        workers: int | None = None,
+    ) -> None:
+        self.bundle = bundle
+        self._tell: Progress = progress or (lambda words, share: None)  # noqa: ARG005 - nobody
+        self._cache = None if bundle.path is None else cache
+        self._most = workers
+        self._forecast = Forecast()
+        self._workers: Workers | None = None
 
-def run_trial(bundle: Bundle, trial: Trial) -> Run:
-    """One run, computed afresh."""
-    estimator = configured(trial.estimator, trial.parameters)
-    view = bundle.view()
-    try:
-        _refuse_recorded(trial, estimator)
-        if trial.perturbation is not None and trial.level is not None:
-            name, _, variant = trial.perturbation.partition(".")
-            stream = np.random.SeedSequence([trial.seed, _PERTURBATION_STREAM])
-            rng = np.random.Generator(np.random.PCG64(stream))
-            view = PERTURBATIONS.load(name)().apply(view, variant, trial.level, rng)
-        _refuse_ignored(view, estimator)
-        return Run(trial, estimator.run(view, seed=trial.seed))
-    except NotApplicableError as reason:
-        return Run(trial, None, str(reason))
+    def __enter__(self) -> Self:
+        return self
 
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
 
-def _refuse_recorded(trial: Trial, estimator: Any) -> None:
-    """What was recorded stays as it was, whatever is done to the evidence."""
-    if trial.perturbation is not None and not getattr(estimator, "reruns", True):
-        raise NotApplicableError("recorded, cannot be run again")
+    def close(self) -> None:
+        """End the workers; the next round would start others."""
+        if self._workers is not None:
+            self._workers.close()
+            self._workers = None
 
+    def replay(self, trials: Sequence[Trial]) -> list[Run]:
+        """A run for each trial, in their order.
 
-def _refuse_ignored(view: BundleView, estimator: Any) -> None:
-    """A setting that is not honoured would pass the baseline off as a trial."""
-    ignored = sorted(set(view.settings) - estimator.settings)
-    if ignored:
-        raise NotApplicableError(f"has no setting {', '.join(ignored)}", where=estimator.name)
+        A trial that the log or the estimator does not allow gives a run without an estimate that
+        says why.
 
+        Raises:
+            UsageError: a trial is of another bundle, or names what does not exist, or has
+                parameters that its estimator does not take.
+        """
+        for trial in trials:
+            if trial.bundle_id != self.bundle.manifest.bundle_id:
+                raise UsageError(f"trial {trial.id} is of another bundle", where=trial.bundle_id)
+        known = {trial: cached_run(trial, self._cache) for trial in dict.fromkeys(trials)}
+        runs = {trial: run for trial, run in known.items() if run is not None}
+        pending = [trial for trial in known if trial not in runs]
+        runs |= dict(self._computed(pending))
+        self._tell("replayed", 1.0)
+        return [runs[trial] for trial in trials]
 
-def run_file(trial: Trial, cache: Path) -> Path:
-    """Where a cache keeps the run of a trial."""
-    return cache / f"{_key(trial)}.npz"
+    def _computed(self, pending: Sequence[Trial]) -> Iterator[tuple[Trial, Run]]:
+        most = worth_workers(self.bundle, pending) if self._most is None else self._most
+        done: list[Trial] = []
+        if most < 2 or self.bundle.path is None:
+            for place, trial in enumerate(pending):
+                waiting = pending[place:]
+                self._tell(_words(trial), self._forecast.share(done, waiting, {}))
+                since = monotonic()
+                yield trial, self._here(trial)
+                self._forecast.learn(trial, monotonic() - since)
+                done.append(trial)
+                self._tell(_words(trial), self._forecast.share(done, waiting[1:], {}))
+            return
+        if self._workers is None:
+            self._workers = Workers(self.bundle.path, self._cache)
+        share = 0.0
+        for event in self._workers.run_each(pending, most, self._forecast):
+            if isinstance(event, Ended):
+                # What no worker did is done here, where its fault shows.
+                yield event.trial, event.run or self._here(event.trial)
+                done.append(event.trial)
+            running = self._workers.running
+            waiting = [t for t in pending if t not in done and t not in running]
+            share = max(share, self._forecast.share(done, waiting, running))
+            self._tell(_words(next(iter(running), pending[-1])), share)
 
-
-def _from_cache(trial: Trial, cache: Path | None) -> Run | None:
-    if cache is None or not run_file(trial, cache).is_file():
-        return None
-    try:
-        return read_run(run_file(trial, cache))
-    except BundleError:
-        return None  # damaged, or of an older version: computed again and replaced
-
-
-def into_cache(bundle: Bundle, trial: Trial, cache: Path | None) -> Run:
-    """One run, computed afresh and kept in a folder, where that can be written."""
-    run = run_trial(bundle, trial)
-    if cache is not None:
-        try:
-            cache.mkdir(parents=True, exist_ok=True)
-            write_file(run_file(trial, cache), run_bytes(run))
-        except (OSError, OutputError):
-            pass  # a cache that cannot be written costs time, nothing else
-    return run
-
-
-def _key(trial: Trial) -> str:
-    """Hash of everything a run depends on: evidence, trial, configuration, code, numpy."""
-    estimator = ESTIMATORS.load(trial.estimator)
-    configuration = repr(configured(trial.estimator, trial.parameters))
-    parts = [json.dumps(trial.record), configuration, _code(), np.__version__]
-    parts.append(_source(estimator))
-    if trial.perturbation is not None:
-        perturbation = PERTURBATIONS.load(trial.perturbation.partition(".")[0])
-        parts += [repr(perturbation()), _source(perturbation)]
-    return hashlib.sha256("\0".join(parts).encode()).hexdigest()
-
-
-@once
-def _code() -> str:
-    root = Path(slamreplay.__file__).parent
-    digest = hashlib.sha256()
-    for file in sorted(f for name in _CODE for f in (root / name).rglob("*.py")):
-        digest.update(file.relative_to(root).as_posix().encode() + b"\0" + file.read_bytes())
-    return digest.hexdigest()
-
-
-def _source(thing: Any) -> str:
-    """The file a plug-in comes from: ours are hashed with the package already."""
-    try:
-        return Path(inspect.getfile(thing)).read_text(encoding="utf-8")
-    except (OSError, TypeError):
-        return repr(thing)
+    def _here(self, trial: Trial) -> Run:
+        run = run_trial(self.bundle, trial)
+        if self._cache is not None:
+            keep_run(run, self._cache)
+        return run
 
 
 def _words(trial: Trial) -> str:

@@ -9,6 +9,7 @@ from slamreplay.bundle.findings import Finding
 from slamreplay.report.assess import title_of
 from slamreplay.report.build_ledger import jump_parts, ledger_part, trace_part
 from slamreplay.report.evidence import Postmortem, TrialResult
+from slamreplay.report.latency import latency_part
 from slamreplay.report.model import (
     SCHEMA_VERSION,
     ActionPart,
@@ -87,6 +88,7 @@ def build(post: Postmortem) -> Report:
         ledger=ledger_part(post),
         jumps=jump_parts(post),
         trace=trace_part(post),
+        latency=latency_part(post),
     )
 
 

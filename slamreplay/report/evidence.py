@@ -26,6 +26,7 @@ from slamreplay.report.ledger import LedgerSet, ledger_sets
 from slamreplay.report.trace import RunTrace, trace
 from slamreplay.rootcause.result import RootCause
 from slamreplay.verdict.judgement import ConstantOffset, Judgement
+from slamreplay.verdict.latency.latency import Latency, Usage
 from slamreplay.verdict.limits import Limits
 from slamreplay.verdict.reliability import Reliability, measured_reliability
 
@@ -62,6 +63,8 @@ class Postmortem:
         trace_ns: the moment around which is asked what moved the belief, None if nobody asked.
         root_cause: which single thing reproduces what went wrong; None where nothing did, or nobody
             asked.
+        latency: how old the pose was whenever it was used, None where that was not asked.
+        usages: the same in a few numbers, by consumer.
         slam: the map and the graph that the undisturbed run of `pose_graph` made.
         reliability: how often what was said with a confidence was right, as measured.
     """
@@ -84,6 +87,8 @@ class Postmortem:
     jumps: tuple[tuple[Trial, tuple[Jump, ...]], ...] = ()
     trace_ns: int | None = None
     root_cause: RootCause | None = None
+    latency: Latency | None = None
+    usages: tuple[Usage, ...] = ()
     slam: MapAndGraph | None = None
     reliability: Reliability = field(default_factory=measured_reliability)
 

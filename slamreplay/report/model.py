@@ -316,6 +316,66 @@ class TracePart(_Strict):
     runs: list[TraceRunPart]
 
 
+class AgePart(_Strict):
+    """Numbers over the uses of a pose, s, m or rad by the key they stand under.
+
+    The interval of p95 is the 95 % one for `n_eff` effective samples, null with too few.
+    """
+
+    p50: Number
+    p95: Number
+    max: Number
+    p95_low: Number
+    p95_high: Number
+    n: Ns
+    n_eff: Number
+
+
+class UsagePart(_Strict):
+    """One consumer of the pose; `topic` is null where it was not recorded.
+
+    Then its times are those it would have had at the budget's rate. `pose_s` counts from the moment
+    that tf could answer for, `correction_s` from what the localizer's last word speaks of,
+    `update_s` from its last new word; `sensing_s`, `answering_s` and `waiting_s` are medians of
+    what a correction's age is made of. `unknown_*` is how the robot moved within `pose_s`.
+    """
+
+    name: Literal["controller", "planner", "recoveries"]
+    topic: Text | None
+    uses: Ns
+    rate_hz: Number
+    longest_pause_s: Number
+    work_s: Number
+    budget_hz: Number
+    budget_s: Number
+    over_share: Share
+    over_low: Share
+    over_high: Share
+    pose_s: AgePart
+    correction_s: AgePart
+    update_s: AgePart
+    sensing_s: Number
+    answering_s: Number
+    waiting_s: Number
+    unknown_m: AgePart
+    unknown_rad: AgePart
+
+
+class LatencyPart(_Strict):
+    """How old the pose was when it was used, and how stamps and log times compare.
+
+    `basis`: ages are absolute (shared), longer than told (relative), or count from arrival.
+    `dated`: what a correction's age counts from; `ahead_s` is how far its stamps are dated ahead.
+    """
+
+    basis: Literal["shared", "relative", "arrival"]
+    caveats: list[Text]
+    localizer: Text | None
+    dated: Literal["scan", "stamp", "arrival"] | None
+    ahead_s: Number
+    consumers: list[UsagePart]
+
+
 class Report(_Strict):
     """report.json."""
 
@@ -335,6 +395,7 @@ class Report(_Strict):
     ledger: LedgerPart
     jumps: list[JumpPart]
     trace: TracePart | None
+    latency: LatencyPart | None
 
     def json_text(self) -> str:
         """The file's text; NaN cannot occur in it."""

@@ -15,6 +15,7 @@ from slamreplay.report.evidence import Postmortem
 from slamreplay.report.facts import Fact, deciding_facts
 from slamreplay.report.finding_rows import FindingRow, finding_rows
 from slamreplay.report.innovations import innovations
+from slamreplay.report.latency import latency_note, usage_table
 from slamreplay.report.phrases import percent, seconds
 from slamreplay.report.tables import Table, table
 from slamreplay.report.timeline import Band, bands, marks
@@ -54,6 +55,8 @@ class Page:
     graph_alt: str
     innovations: Table
     jumps: Table
+    usages: Table
+    latency_note: str
     traces: tuple[tuple[str, Table], ...]
     trace_note: str
     findings: tuple[FindingRow, ...]
@@ -111,6 +114,8 @@ def page(post: Postmortem) -> Page:
         graph_alt=phrases.graph_alt(post),
         innovations=innovations(post),
         jumps=trace_tables.jumps(post),
+        usages=usage_table(post),
+        latency_note=latency_note(post),
         traces=trace_tables.traces(post),
         trace_note=trace_tables.trace_note(post),
         findings=finding_rows(post),

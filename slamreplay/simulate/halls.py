@@ -36,11 +36,15 @@ def random_warehouse(rng: np.random.Generator, size_m: tuple[float, float] | Non
     return _finished(rng, (width, height), solids, turned=rng.random() < 0.5)
 
 
-def repeated_aisles(rng: np.random.Generator) -> tuple[World, float]:
+def repeated_aisles(rng: np.random.Generator, shorter: int = 2) -> tuple[World, float]:
     """A hall of racks that repeat at one pitch, told apart by little; and the pitch along y, m.
 
-    Two racks are missing or short, and buttresses and pillars stand at uneven places: one aisle
-    looks much like the next one, but not quite.
+    Some racks are short, and buttresses and pillars stand at uneven places: one aisle looks much
+    like the next one, but not quite. Without short racks only the hall's ends tell them apart.
+
+    Args:
+        rng: of every choice.
+        shorter: how many racks are short.
     """
     rows = int(rng.integers(4, 6))
     pitch = float(rng.uniform(3.2, 3.9))
@@ -48,13 +52,13 @@ def repeated_aisles(rng: np.random.Generator) -> tuple[World, float]:
     gap, x0, y0 = rng.uniform(2.0, 2.6), rng.uniform(2.4, 3.0), rng.uniform(2.6, 3.2)
     width = x0 + lengths.sum() + gap * (len(lengths) - 1) + rng.uniform(2.4, 3.2)
     height = y0 + pitch * (rows - 1) + 1.0 + rng.uniform(2.2, 2.8)
-    odd = {int(k) for k in rng.choice(rows * len(lengths), size=2, replace=False)}
+    odd = {int(k) for k in rng.choice(rows * len(lengths), size=shorter, replace=False)}
     solids = []
     for row in range(rows):
         x = x0
         for k, length in enumerate(lengths):
-            shorter = rng.uniform(0.8, 1.6) if row * len(lengths) + k in odd else 0.0
-            solids.append(box(f"rack {row}.{k}", x, y0 + row * pitch, length - shorter, 1.0))
+            less = rng.uniform(0.8, 1.6) if row * len(lengths) + k in odd else 0.0
+            solids.append(box(f"rack {row}.{k}", x, y0 + row * pitch, length - less, 1.0))
             x += length + gap
     return _finished(rng, (width, height), solids, turned=False), pitch
 

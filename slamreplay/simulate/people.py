@@ -7,8 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from slamreplay.geometry import se2
+from slamreplay.geometry.discs import range_to_disc
 
 RADIUS_M = 0.22
+#: Where somebody is who is not there.
+_AWAY_M = -1e6
 
 
 @dataclass(frozen=True)
@@ -36,6 +39,30 @@ class Walker:
         return np.column_stack([np.interp(gone, arcs, path[:, i]) for i in (0, 1)])
 
 
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Companion(Walker):
+    """Somebody who keeps at one place beside the robot, in its own frame.
+
+    Attributes:
+        t_s: (N,) times of the robot's poses, in order.
+        robot_xyyaw: (N, 3) where it was.
+        beside_m: (2,) where they walk, in the robot's frame.
+        stays_s: (from, to): before and after it they are far away.
+    """
+
+    t_s: se2.Array
+    robot_xyyaw: se2.Array
+    beside_m: tuple[float, float]
+    stays_s: tuple[float, float]
+
+    def at(self, t_s: se2.Array) -> se2.Array:
+        """(N, 2) positions at times (N,) since the start."""
+        xy = se2.compose(self.robot_xyyaw, np.array([*self.beside_m, 0.0]))[:, :2]
+        found = np.column_stack([np.interp(t_s, self.t_s, xy[:, i]) for i in (0, 1)])
+        found[(t_s < self.stays_s[0]) | (t_s > self.stays_s[1])] = _AWAY_M
+        return found
+
+
 def ranges_to(walkers: tuple[Walker, ...], t_s: se2.Array, rays: se2.Array) -> se2.Array:
     """(N,) range to the nearest person along each ray, inf where there is none.
 
@@ -47,9 +74,5 @@ def ranges_to(walkers: tuple[Walker, ...], t_s: se2.Array, rays: se2.Array) -> s
     nearest = np.full(len(t_s), np.inf)
     for walker in walkers:
         off = walker.at(t_s) - rays[:, :2]
-        along = off[:, 0] * np.cos(rays[:, 2]) + off[:, 1] * np.sin(rays[:, 2])
-        beside2 = np.sum(off**2, axis=1) - along**2
-        half = np.sqrt(np.maximum(walker.radius_m**2 - beside2, 0.0))
-        hit = (beside2 < walker.radius_m**2) & (along > half)
-        nearest = np.where(hit, np.minimum(nearest, along - half), nearest)
+        nearest = np.minimum(nearest, range_to_disc(off, rays[:, 2], walker.radius_m))
     return nearest

@@ -12,7 +12,7 @@ from slamreplay.simulate import sensors
 from slamreplay.simulate.codes import Readings, read_codes
 from slamreplay.simulate.drive import Motion, drive
 from slamreplay.simulate.localizer import Beliefs, localize
-from slamreplay.simulate.scenarios import CLICKED_COV, Scenario
+from slamreplay.simulate.scenarios import Scenario
 from slamreplay.simulate.worlds import rasterise, redrawn
 
 ODOMETRY_RATE_HZ = 25.0
@@ -86,6 +86,8 @@ def record(scenario: Scenario, seed: int | None = None) -> Recording:
         )
         rear = _seen(rear, scenario)
     odometry = sensors.wheel_odometry(scenario.wheels, motion, ODOMETRY_RATE_HZ, wheel_rng)
+    if scenario.true_odometry_s:
+        odometry = sensors.told_truly(odometry, motion, scenario.true_odometry_s)
     gyro, force = sensors.imu(motion, imu_rng)
     clicked = np.array(scenario.believed_start or scenario.start)
     # Nobody clicks exactly; a careful person is within a decimetre and a few degrees.
@@ -99,7 +101,7 @@ def record(scenario: Scenario, seed: int | None = None) -> Recording:
         scenario.lidar,
         stamped,
         odometry,
-        (clicked, CLICKED_COV),
+        (clicked, scenario.start_cov),
         filter_seed,
         scenario.amcl,
     )

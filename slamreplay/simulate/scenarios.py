@@ -37,6 +37,7 @@ class Scenario:
         verdict: the state that the definitions of the report give it, computed from the truth.
         seed: the one used unless another is asked for.
         believed_start: the pose somebody clicked; the true one if None.
+        start_sigmas: (3,) how well the start is said to be known, m, m, rad; as clicked if None.
         walkers: the people.
         lidar: the range finder.
         wheels: how wrong the odometry is.
@@ -52,6 +53,8 @@ class Scenario:
         floor: codes in the floor that the robot reads from above.
         logged: the world the map in the log was drawn from, where it is not the robot's own.
         xyyaw_logged_map: (3) the robot's map frame in the frame of the map in the log.
+        true_odometry_s: stretches (from, to) in s in which odometry tells the motion as it was,
+            whatever the wheels did: what a slip or a carry would have been without its fault.
     """
 
     mapped: World
@@ -75,6 +78,13 @@ class Scenario:
     floor: CodeFloor | None = None
     logged: World | None = None
     xyyaw_logged_map: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    start_sigmas: tuple[float, float, float] | None = None
+    true_odometry_s: tuple[tuple[float, float], ...] = ()
+
+    @property
+    def start_cov(self) -> se2.Array:
+        """(3, 3) what is sent with the first pose."""
+        return CLICKED_COV if self.start_sigmas is None else np.diag(self.start_sigmas) ** 2
 
 
 #: What rviz sends with a clicked pose: 0.5 m, 0.5 m, 15 deg.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -142,6 +142,25 @@ def wheel_odometry(
     covs = covs.astype(np.float32).astype(np.float64)
     twist = np.column_stack([distance, turn]) / dt[:, None]
     return Odometry(motion.t_s[rows], poses[rows], covs[rows], twist[rows])
+
+
+def told_truly(
+    odometry: Odometry, motion: Motion, stretches: tuple[tuple[float, float], ...]
+) -> Odometry:
+    """Odometry whose steps inside of stretches (from, to) in s are those that the robot made."""
+    true = motion.poses_at(odometry.t_s)
+    steps = se2.between(odometry.xyyaw[:-1], odometry.xyyaw[1:])
+    steps_made = se2.between(true[:-1], true[1:])
+    for low, high in stretches:
+        inside = (odometry.t_s[1:] > low) & (odometry.t_s[:-1] < high)
+        steps[inside] = steps_made[inside]
+    yaw = odometry.xyyaw[0, 2] + np.concatenate([[0.0], np.cumsum(steps[:, 2])])
+    cos, sin = np.cos(yaw[:-1]), np.sin(yaw[:-1])
+    along = np.column_stack(
+        [cos * steps[:, 0] - sin * steps[:, 1], sin * steps[:, 0] + cos * steps[:, 1]]
+    )
+    xy = odometry.xyyaw[0, :2] + np.vstack([np.zeros(2), np.cumsum(along, axis=0)])
+    return replace(odometry, xyyaw=np.column_stack([xy, se2.wrap_angle(yaw)]))
 
 
 def imu(motion: Motion, rng: np.random.Generator) -> tuple[se2.Array, se2.Array]:

@@ -17,7 +17,6 @@ from slamreplay.simulate.drive import RATE_HZ, Follow, Phase
 from slamreplay.simulate.localizer import odometry_at
 from slamreplay.simulate.messages import Messages
 from slamreplay.simulate.recording import Recording
-from slamreplay.simulate.scenarios import CLICKED_COV
 from slamreplay.simulate.sensors import XYYAW_BASE_LASER, XYYAW_BASE_REAR, Lidar, Scans
 
 #: Stamps start here: a fixed time, for a log must not depend on when it was made.
@@ -69,7 +68,7 @@ def _start(r: Recording, m: Messages) -> Iterator[Record]:
     known = r.logged_map
     grid = m.grid(_ns(0), "map", known.cells, known.resolution_m, known.origin_xyyaw)
     yield Record(_ns(0.005), "/map", "nav_msgs/OccupancyGrid", grid)
-    clicked = m.pose_stamped_with_covariance(_ns(0.02), r.start, CLICKED_COV)
+    clicked = m.pose_stamped_with_covariance(_ns(0.02), r.start, r.scenario.start_cov)
     yield Record(
         _ns(0.02 + _REST_LATE),
         "/initialpose",

@@ -12,7 +12,7 @@ from slamreplay.bundle.manifest import Clock, FrameEdge, Frames, Manifest, MapVe
 from slamreplay.bundle.schema import TABLES
 from slamreplay.bundle.tables import Table
 from slamreplay.bundle.view import Bundle
-from slamreplay.geometry import se2
+from slamreplay.geometry import se2, se3
 from slamreplay.geometry.covariance import ros_from_planar
 from slamreplay.geometry.times import ns
 from slamreplay.maps.grid import OccupancyGrid
@@ -32,6 +32,7 @@ __all__ = [
     "RANGE_MAX_M",
     "START_NS",
     "TAGS_XYYAW",
+    "imu_rows",
     "odometry_rows",
     "pose_rows",
     "room_grid",
@@ -41,6 +42,7 @@ __all__ = [
     "synthetic_bundle",
     "synthetic_manifest",
     "true_path",
+    "unit_on_its_back",
 ]
 
 #: The laser on the robot; neither straight nor central, so that a forgotten mount shows.
@@ -90,6 +92,7 @@ def synthetic_bundle(
     belief_offset_xyyaw: Sequence[float] = (0.0, 0.0, 0.0),
     offset_from_s: float = 0.0,
     with_tags: bool = False,
+    with_imu: bool = False,
 ) -> Bundle:
     """A bundle in memory, with scans, odometry, tf, map, belief, initial pose and reference.
 
@@ -104,12 +107,14 @@ def synthetic_bundle(
         belief_offset_xyyaw: how far that belief is from the truth (in the robot's frame),
         offset_from_s: from then on, in seconds after the start.
         with_tags: whether the robot sees tags that static transforms tie to the map, at 4 Hz.
+        with_imu: whether it has an inertial unit at 50 Hz, which a static transform places upside
+            down.
     """
     rng = np.random.Generator(np.random.PCG64(seed))
     options = (seconds, seed, with_map, with_initial_pose, with_belief, with_tags)
     offset = tuple(float(v) for v in belief_offset_xyyaw)
     seen = room_grid() if world is None else world
-    identity = repr((*options, offset, offset_from_s, seen.version))
+    identity = repr((*options, offset, offset_from_s, seen.version)) + " imu" * with_imu
 
     scan_s = np.arange(0.0, seconds, 0.1)
     odometry_s = np.arange(0.0, seconds + 0.05, 0.05)
@@ -144,6 +149,10 @@ def synthetic_bundle(
         tags = sighting_rows(tag_s, true_path(tag_s), _tag_noise, own)
         tables["references"] = Table.concat(TABLES["references"], [tables["references"], tags])
         transforms += survey_rows()
+    if with_imu:
+        own = np.random.Generator(np.random.PCG64([seed, 2]))
+        tables["imu"] = imu_rows(np.arange(0.0, seconds, 0.02), own)
+        transforms.append(unit_on_its_back())
     tables["transforms"] = Table.concat(TABLES["transforms"], transforms)
     grids = {room_grid().version: room_grid()} if with_map else {}
     manifest = synthetic_manifest(tables, identity, seconds, with_map, with_belief)
@@ -155,11 +164,12 @@ def synthetic_manifest(
 ) -> Manifest:
     """What the bundle says of itself; `identity` makes its id."""
     roles = {"scans": "scan", "odometry": "odometry", "references": "reference"}
-    roles |= {"initial_poses": "initial_pose"} if "initial_poses" in tables else {}
+    optional = {"initial_poses": "initial_pose", "imu": "imu"}
+    roles |= {name: role for name, role in optional.items() if name in tables}
     found = [(role, str(tables[name]["topic"][0])) for name, role in roles.items()]
     if with_belief:
         found += [("pose", "/amcl_pose"), ("covariance", "/amcl_pose")]
-    lacking = ["imu", "costmap", "recovery"]
+    lacking = ["costmap", "recovery"] if "imu" in tables else ["imu", "costmap", "recovery"]
     lacking += [] if with_belief else ["pose", "covariance"]
     lacking += [] if with_map else ["map"]
     tf = tables["transforms"]
@@ -304,6 +314,37 @@ def odometry_rows(t_s: NDArray[np.float64], xyyaw: se2.Array) -> Table:
         angular_velocity_xyz=np.column_stack([zero, zero, turn]),
         twist_covariance=np.full((len(t_s), 36), np.nan),
     )
+
+
+def imu_rows(t_s: NDArray[np.float64], rng: np.random.Generator) -> Table:
+    """What an inertial unit measures at times (N,) that lies on its back: its z axis points down.
+
+    Rates scatter by 0.005 rad/s; its orientation tells the heading to 0.002 rad.
+    """
+    yaw = np.unwrap(true_path(t_s)[:, 2])
+    rate = np.gradient(yaw, t_s) + 0.005 * rng.standard_normal(len(t_s))
+    scattered = yaw + 0.002 * rng.standard_normal(len(t_s))
+    zero, felt = np.zeros(len(t_s)), -9.81 + 0.02 * rng.standard_normal(len(t_s))
+    upright = se3.quaternion_from_rpy(zero + np.pi, zero, zero)
+    unknown = np.full((len(t_s), 9), np.nan)
+    return table_of(
+        "imu",
+        "/imu",
+        t_s,
+        frame_id="imu",
+        orientation_xyzw=se3.yawed(upright, scattered),
+        orientation_covariance=unknown,
+        angular_velocity_xyz=np.column_stack([zero, zero, -rate]),
+        angular_velocity_covariance=unknown,
+        linear_acceleration_xyz=np.column_stack([zero, zero, felt]),
+        linear_acceleration_covariance=unknown,
+    )
+
+
+def unit_on_its_back() -> Table:
+    """The static transform that places it."""
+    flat = tf_rows("base_link", "imu", np.zeros(1), np.zeros((1, 3)), is_static=True)
+    return flat.replace(rotation_xyzw=np.array([[1.0, 0.0, 0.0, 0.0]]))
 
 
 def pose_rows(

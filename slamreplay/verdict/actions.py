@@ -13,7 +13,7 @@ from slamreplay.bundle.track import PoseTrack
 from slamreplay.bundle.view import BundleView
 from slamreplay.geometry import se2
 from slamreplay.verdict.belief_error import BeliefError
-from slamreplay.verdict.clearance import Obstacles
+from slamreplay.verdict.clearance import Clearance, Obstacles
 from slamreplay.verdict.contract import Contract
 from slamreplay.verdict.gate import allows, ratio, sigma_towards
 from slamreplay.verdict.goals import recoveries
@@ -72,7 +72,8 @@ def actions(
     found = []
     for t, kind, name, consumer in sorted(moments):
         path = paths.ahead(t, planned=name == "plan")
-        sigma, clearance = _room(t, belief, obstacles, path)
+        sigma, room = room_at(t, belief, obstacles, path)
+        clearance = None if room is None else room.metres
         judged = sigma is not None and clearance is not None
         error = None if outcome is None else _error(outcome.error, t)
         is_inferred = kind == "recovery" and (t, name) in inferred
@@ -162,17 +163,22 @@ def _finding(
     )
 
 
-def _room(
+def room_at(
     t_ns: int, belief: PoseTrack | None, obstacles: Obstacles, path_xy: se2.Array
-) -> tuple[float | None, float | None]:
-    """Standard deviation towards the nearest obstacle along the path, and the room to it."""
+) -> tuple[float | None, Clearance | None]:
+    """Standard deviation towards the nearest obstacle along the path, and the room to it.
+
+    Args:
+        t_ns: the time, on the bundle's clock.
+        belief: base in map with its covariance.
+        obstacles: what stands there.
+        path_xy: (M, 2) places the robot is about to pass, in its base frame at that time.
+    """
     room = obstacles.clearance(t_ns, path_xy)
     covariance = None if belief is None else _covariance_at(belief, t_ns)
-    if room is None:
-        return None, None
-    if covariance is None:
-        return None, room.metres
-    return sigma_towards(covariance, room.direction_xy), room.metres
+    if room is None or covariance is None:
+        return None, room
+    return sigma_towards(covariance, room.direction_xy), room
 
 
 def _error(error: BeliefError, t_ns: int) -> float | None:

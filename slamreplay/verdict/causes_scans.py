@@ -21,6 +21,8 @@ DELAY_S = 0.1
 ALIKE = 0.9
 #: A belief that was matched to a wrong place jumps there; one that only trusts itself slides.
 JUMP_M = 0.2
+#: Right after the jump is so long.
+SOON_NS = 5 * NS_PER_S
 #: A gap in the scans this shortly before the loss has to do with it.
 BLIND_NS = 3 * NS_PER_S
 #: A change this shortly before or after the loss has to do with it.
@@ -82,7 +84,9 @@ def pulled(case: Case, lost: Interval, onset: int, least_m: float) -> Answer | N
         "than odometry and hindsight"
     )
     inside = (error.t_ns >= lost.start_ns) & (error.t_ns < lost.end_ns) & error.off(case.limits)
-    if fits_at_belief(case.view, error, inside & error.known, ALIKE):
+    # A place that looks alike does so at once; later on the robot drives where it does not.
+    soon = inside & (error.t_ns <= int(error.t_ns[found.end]) + SOON_NS)
+    if any(fits_at_belief(case.view, error, r & error.known, ALIKE) for r in (inside, soon)):
         text = f"{moved}: its scans fit the map there as well as where it really was"
         return "sensing_ambiguity", 0.7, [text]
     return "association_error", 0.6, [f"{moved}: its scans were matched to the wrong place"]

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slamreplay.bundle.odometry import odometry_track
+from slamreplay.bundle.tables import Table
 from slamreplay.bundle.track import PoseTrack
 from slamreplay.bundle.view import BundleView
 from slamreplay.geometry import se2
@@ -83,9 +84,14 @@ def commanded(view: BundleView) -> tuple[NDArray[np.int64], NDArray[np.bool_]] |
     if table is None or not len(table):
         return None
     table = table.sorted_by_time()
-    v = np.linalg.norm(np.nan_to_num(table["linear_velocity_xyz"]), axis=1)
-    w = np.abs(np.nan_to_num(table["angular_velocity_xyz"][:, 2]))
-    return table.t_ns, (v > COMMAND_M_S) | (w > COMMAND_RAD_S)
+    return table.t_ns, asks_for_motion(table)
+
+
+def asks_for_motion(commands: Table) -> NDArray[np.bool_]:
+    """(N,) which rows of a table of commands are more than zeros of a controller that is idle."""
+    v = np.linalg.norm(np.nan_to_num(commands["linear_velocity_xyz"]), axis=1)
+    w = np.abs(np.nan_to_num(commands["angular_velocity_xyz"][:, 2]))
+    return np.asarray((v > COMMAND_M_S) | (w > COMMAND_RAD_S))
 
 
 def protections(view: BundleView, low_ns: int, high_ns: int) -> str | None:

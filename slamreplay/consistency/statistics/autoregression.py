@@ -71,10 +71,9 @@ def autocorrelation_of(reflection: Array, n: int) -> Array:
     model = np.append(1.0, -a)
     end = min(n, p + 1 + _memory(model))
     if end > p + 1:
-        from scipy.signal import lfilter, lfiltic  # takes most of a second to load
+        from slamreplay.consistency.statistics.lattice import carried_on  # as above
 
-        state = lfiltic([1.0], model, rho[p:0:-1])
-        rho[p + 1 : end] = lfilter([1.0], model, np.zeros(end - p - 1), zi=state)[0]
+        carried_on(rho, a, p + 1, end)
     return rho
 
 

@@ -27,3 +27,17 @@ def reflections(series, order):  # type: ignore[no-untyped-def]
                 forward[t + k + 1, i] = ahead - r * behind
                 backward[t, i] = behind - r * ahead
     return out
+
+
+@njit(cache=True)
+def carried_on(series, a, first, stop):  # type: ignore[no-untyped-def]
+    """Fill a series from `first` up to `stop` by series[k] = sum over i of a[i] series[k - 1 - i].
+
+    The least recent goes first into the sum, as in scipy's filters, which take long to load.
+    """
+    p = len(a)
+    for k in range(first, stop):
+        total = 0.0
+        for i in range(p - 1, -1, -1):
+            total += a[i] * series[k - 1 - i]
+        series[k] = total

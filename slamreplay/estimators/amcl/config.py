@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
-from math import inf, isfinite, pi
+from dataclasses import dataclass, fields, replace
+from math import inf, isfinite, pi, sqrt
 from typing import Literal
 
 import numpy as np
@@ -136,6 +136,26 @@ class AmclConfig:
                 f"max_particles {self.max_particles} is below min_particles {self.min_particles}",
                 where="amcl",
             )
+
+    def scaled(self, process: float, measurement: float) -> AmclConfig:
+        """The same with variances of motion and of the laser so many times as large.
+
+        The alphas are variances per squared motion, or standard deviations where
+        `squared_motion_noise` takes them for such; the laser's is that of `sigma_hit`, whose
+        Gaussian has no normaliser: it only grows wider.
+        """
+        if process == measurement == 1.0:
+            return self
+        motion = sqrt(process) if self.squared_motion_noise else process
+        return replace(
+            self,
+            alpha1=motion * self.alpha1,
+            alpha2=motion * self.alpha2,
+            alpha3=motion * self.alpha3,
+            alpha4=motion * self.alpha4,
+            alpha5=motion * self.alpha5,
+            sigma_hit=sqrt(measurement) * self.sigma_hit,
+        )
 
     @property
     def initial_pose(self) -> tuple[Array, Array]:

@@ -8,6 +8,7 @@ from itertools import pairwise
 from typing import ClassVar, Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from slamreplay.bundle.run import Estimate
 from slamreplay.bundle.scans import ScanSet
@@ -20,11 +21,13 @@ from slamreplay.estimators.amcl.match import ScanMatcher
 from slamreplay.estimators.amcl.parameters import LIVE, NAMES, config_from
 from slamreplay.estimators.amcl.scan_quantile import ScanQuantile
 from slamreplay.estimators.inputs import need_grid, need_odometry, need_scans
-from slamreplay.estimators.start import DEFAULT_COV, GLOBAL, OFFSET, ROTATE, Start, starts
+from slamreplay.estimators.scales import MEASUREMENT_NOISE, PARTICLES, PROCESS_NOISE, scales_of
+from slamreplay.estimators.start import DEFAULT_COV, GLOBAL, MOVED, Start, starts
+from slamreplay.maps.grid import OccupancyGrid
+from slamreplay.maps.likelihood_field import distance_field
 
-#: Settings a perturbation may change: a ratio of both particle numbers, and a number that makes
-#: every random one another.
-PARTICLES, RANDOM_SEED = "particle_count", "random_seed"
+#: A setting that a perturbation may change: a number that makes every random one another.
+RANDOM_SEED = "random_seed"
 
 
 @dataclass(frozen=True)
@@ -49,7 +52,13 @@ class Amcl:
     live_parameters: ClassVar[tuple[str, ...]] = LIVE
     name: ClassVar[str] = "amcl"
     needs: ClassVar[frozenset[str]] = frozenset({"odometry", "scans", "map"})
-    settings: ClassVar[frozenset[str]] = frozenset({OFFSET, ROTATE, GLOBAL, PARTICLES, RANDOM_SEED})
+    settings: ClassVar[frozenset[str]] = MOVED | {
+        GLOBAL,
+        PARTICLES,
+        RANDOM_SEED,
+        PROCESS_NOISE,
+        MEASUREMENT_NOISE,
+    }
     without_noise: ClassVar[str] = (
         "a likelihood field is no model of ranges, so that no world has the noise it takes"
     )
@@ -90,7 +99,7 @@ class Amcl:
         if not given and len(known):
             pose, cov = config.initial_pose if config.know_initial_pose else (None, DEFAULT_COV)
             given = {int(known[0]): Start(int(known[0]), pose, cov)}
-        amcl = AmclFilter(config, grid, seeds)
+        amcl = AmclFilter(config, grid, seeds, _distances(view, grid, config))
         quantile = ScanQuantile(config, grid, amcl.distance_m, seeds)
         matcher = ScanMatcher(config, grid, amcl.distance_m)
         ledger = Ledger(scans.t_ns, T_odom_base, frame_id=view.manifest.frames.map or grid.frame_id)
@@ -125,13 +134,21 @@ class Amcl:
 
     def _perturbed(self, view: BundleView, seed: int) -> tuple[AmclConfig, tuple[int, ...]]:
         """The configuration and the words of the seed, as a perturbation changes them."""
-        c, ratio = self.config, view.settings.get(PARTICLES, 1.0)
+        c, ratio = self.config.scaled(*scales_of(view)), view.settings.get(PARTICLES, 1.0)
         if ratio != 1.0:
             least, most = (max(1, round(ratio * n)) for n in (c.min_particles, c.max_particles))
             c = replace(c, min_particles=least, max_particles=most)
         words = (c.random_seed if c.random_seed >= 0 else seed,)
         other = round(view.settings.get(RANDOM_SEED, 0.0)) % 2**32
         return c, (*words, other) if other else words
+
+
+def _distances(view: BundleView, grid: OccupancyGrid, config: AmclConfig) -> NDArray[np.float32]:
+    """The map's distances to walls, once for all trials whose map has these cells, moved or not."""
+    most = config.laser_likelihood_max_dist
+    return view.bundle.shared.of(
+        "distances", (grid.resolution_m, most), [grid.cells], lambda: distance_field(grid, most)
+    )
 
 
 def _beams(config: AmclConfig, scans: ScanSet, row: int) -> Beams:

@@ -37,9 +37,16 @@ class AmclFilter:
         config: the parameters.
         grid: the map.
         seed: of every random number it draws; words of one.
+        distance_m: (H, W) of `distance_field` for this map and configuration, where it is known.
     """
 
-    def __init__(self, config: AmclConfig, grid: OccupancyGrid, seed: int | Sequence[int]) -> None:
+    def __init__(
+        self,
+        config: AmclConfig,
+        grid: OccupancyGrid,
+        seed: int | Sequence[int],
+        distance_m: NDArray[np.float32] | None = None,
+    ) -> None:
         self._config = config
         self._grid = grid
         self._rng = np.random.Generator(np.random.PCG64(seed))
@@ -49,7 +56,9 @@ class AmclFilter:
         self._slow = self._fast = self._ess = 0.0
         self._is_converged = False
         self._particles, self._weights = np.empty((3, 0)), np.empty(0)
-        self._distance_m = distance_field(grid, config.laser_likelihood_max_dist)
+        if distance_m is None:
+            distance_m = distance_field(grid, config.laser_likelihood_max_dist)
+        self._distance_m = distance_m
         self._likelihood = laser_model(config, grid, self._distance_m)
         self._last_odometry: se2.Array | None = None
         self.initialise(np.zeros(3), DEFAULT_COV)

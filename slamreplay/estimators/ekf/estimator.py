@@ -34,11 +34,11 @@ from slamreplay.estimators.ekf.own_parameters import numbers_of
 from slamreplay.estimators.ekf.passing import Evidence, Filtered, Held
 from slamreplay.estimators.ekf.tuning import tuned
 from slamreplay.estimators.inputs import need_odometry
-from slamreplay.estimators.start import DEFAULT_COV, GLOBAL, OFFSET, ROTATE, Start, starts
+from slamreplay.estimators.scales import MEASUREMENT_NOISE, PROCESS_NOISE, scales_of
+from slamreplay.estimators.start import DEFAULT_COV, GLOBAL, MOVED, Start, starts
 
-#: Settings a perturbation may change: ratios of the covariances that the filter is told.
-PROCESS_NOISE, MEASUREMENT_NOISE = "process_noise_scale", "measurement_noise_scale"
-SETTINGS = frozenset({OFFSET, ROTATE, GLOBAL, PROCESS_NOISE, MEASUREMENT_NOISE})
+#: Settings a perturbation may change: of the start, and ratios of the covariances that it is told.
+SETTINGS = MOVED | {GLOBAL, PROCESS_NOISE, MEASUREMENT_NOISE}
 #: Names that nodes of robot_localization have in its own files, and often elsewhere.
 NODES = (
     "ekf", "ekf_node", "ekf_filter_node", "ekf_localization", "ekf_localization_node", "ekf_se",
@@ -209,11 +209,6 @@ def _of_moving(
     keep = after_motion(fixes.t_ns, np.zeros(len(fixes), dtype=np.int64), 1, odometry, least_m,
                         least_rad)  # fmt: skip
     return replace(fixes, t_ns=fixes.t_ns[keep], xy=fixes.xy[keep], cov=fixes.cov[keep])
-
-
-def scales_of(view: BundleView) -> tuple[float, float]:
-    """Ratios of the covariances of motion and of sightings that a view asks for."""
-    return view.settings.get(PROCESS_NOISE, 1.0), view.settings.get(MEASUREMENT_NOISE, 1.0)
 
 
 def estimate_of(view: BundleView, evidence: Evidence, done: Filtered) -> Estimate:

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slamreplay.bundle.tables import Table
+from slamreplay.bundle.upright import upright_axis
 from slamreplay.bundle.view import BundleView
 from slamreplay.estimators.ekf.noise import Noise
 from slamreplay.geometry import se2, se3
@@ -22,8 +23,6 @@ from slamreplay.geometry.times import NS_PER_S
 _GAP_NS = NS_PER_S // 4
 #: Faster than any gyroscope of a robot measures, rad/s.
 _ABSURD = 40.0
-#: Up is the mean specific force of so many first samples, where it is this near to gravity, m/s^2.
-_SAMPLES, _GRAVITY, _NEAR = 20, 9.81, 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,7 +80,7 @@ def gyro_of(view: BundleView) -> Gyro | None:
     table = table.sorted_by_time()
     keep = np.append(True, np.diff(table.t_ns) > 0)
     table = table.take(keep)
-    up = _up(view, table)
+    up = upright_axis(view, table)
     if up is None:
         return None
     rate = table["angular_velocity_xyz"] @ up
@@ -89,24 +88,6 @@ def gyro_of(view: BundleView) -> Gyro | None:
     if sound.sum() >= 2:
         return _of_rates(table.take(sound), rate[sound], up)
     return _of_orientation(table)
-
-
-def _up(view: BundleView, table: Table) -> se2.Array | None:
-    """(3,) the robot's upright axis in the unit's frame.
-
-    What a unit feels from the first samples on must not depend on what comes later.
-    """
-    base, frame = view.manifest.frames.base, str(table["frame_id"][0])
-    if base and (frame == base or view.transforms.has_path(base, frame)):
-        T = view.transforms.fixed(base, frame)
-        if T is not None:
-            return np.asarray(T[2, :3])
-    force = view.recorded("imu")
-    force = force.take(force["topic"] == table["topic"][0]).sorted_by_time()
-    felt = force["linear_acceleration_xyz"][:_SAMPLES]
-    mean = felt[np.isfinite(felt).all(axis=1)].mean(axis=0) if len(felt) else np.zeros(3)
-    size = float(np.linalg.norm(mean))
-    return mean / size if abs(size - _GRAVITY) < _NEAR else None
 
 
 def _of_rates(table: Table, rate: se2.Array, up: se2.Array) -> Gyro:

@@ -13,7 +13,7 @@ from slamreplay.bundle.scans import scan_set
 from slamreplay.bundle.sightings import sightings_of
 from slamreplay.bundle.view import BundleView
 from slamreplay.errors import NotApplicableError, UsageError
-from slamreplay.estimators.ekf.estimator import SETTINGS, estimate_of, scales_of
+from slamreplay.estimators.ekf.estimator import SETTINGS, estimate_of
 from slamreplay.estimators.ekf.filter import filtered, gates_of
 from slamreplay.estimators.ekf.gyro import gyro_of
 from slamreplay.estimators.ekf.kernels import ACCEPTED
@@ -23,6 +23,7 @@ from slamreplay.estimators.ekf.passing import Evidence
 from slamreplay.estimators.fiducial_grid.codes import CodeNoise, codes_of
 from slamreplay.estimators.fiducial_grid.lattice import Lattice, lattice_of
 from slamreplay.estimators.inputs import need_odometry
+from slamreplay.estimators.scales import scales_of
 from slamreplay.estimators.start import DEFAULT_COV, Start, starts
 from slamreplay.geometry import se2
 from slamreplay.geometry.times import NS_PER_S

@@ -15,18 +15,13 @@ from slamreplay.estimators.parameters import settings_from
 from slamreplay.estimators.pose_graph.carrying import as_driven, carried, carried_covariances
 from slamreplay.estimators.pose_graph.config import GraphConfig
 from slamreplay.estimators.pose_graph.ledger import closures_ledger
-from slamreplay.estimators.pose_graph.slam import (
-    MEASUREMENT_NOISE,
-    MIN_SCORE,
-    PROCESS_NOISE,
-    Slam,
-    slam_of,
-)
+from slamreplay.estimators.pose_graph.slam import Slam, slam_of
+from slamreplay.estimators.scales import MEASUREMENT_NOISE, MIN_SCORE, PROCESS_NOISE
 from slamreplay.estimators.scan_matching.ledger import match_innovations
-from slamreplay.estimators.start import GLOBAL, OFFSET, ROTATE
+from slamreplay.estimators.start import GLOBAL, MOVED
 from slamreplay.geometry import se2
 
-SETTINGS = frozenset({OFFSET, ROTATE, GLOBAL, MIN_SCORE, PROCESS_NOISE, MEASUREMENT_NOISE})
+SETTINGS = MOVED | {GLOBAL, MIN_SCORE, PROCESS_NOISE, MEASUREMENT_NOISE}
 #: Why the conformance kit cannot make a world that has its noise.
 WITHOUT_NOISE = (
     "it learns from the log what scans miss, and allows for errors that neighbouring beams have in "

@@ -17,13 +17,10 @@ from slamreplay.estimators.pose_graph.config import GraphConfig
 from slamreplay.estimators.pose_graph.doubt import doubted
 from slamreplay.estimators.pose_graph.smoothing import Smoothed, smoothed
 from slamreplay.estimators.pose_graph.submaps import Submaps, chain_covariances, submaps
-from slamreplay.estimators.scan_matching.local import LocalTrajectory, local_trajectory
+from slamreplay.estimators.scales import MIN_SCORE, scales_of
+from slamreplay.estimators.scan_matching.local import LocalTrajectory, local_trajectory_of
 from slamreplay.geometry import se2
 from slamreplay.geometry.covariance import composed
-
-#: Settings a perturbation may change beside those of the start.
-MIN_SCORE = "min_score"
-PROCESS_NOISE, MEASUREMENT_NOISE = "process_noise_scale", "measurement_noise_scale"
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +47,7 @@ def slam_of(view: BundleView, config: GraphConfig, estimator: str, *, is_online:
 
     Args:
         view: the log; its settings `min_score`, `process_noise_scale` and
-            `measurement_noise_scale` change the configuration and the covariances.
+            `measurement_noise_scale` are ratios of the configuration and of the covariances.
         config: hyper-parameters.
         estimator: who asks.
         is_online: whether only what the closures said on the way counts.
@@ -58,15 +55,14 @@ def slam_of(view: BundleView, config: GraphConfig, estimator: str, *, is_online:
     Raises:
         NotApplicableError: no scans, or none with enough points.
     """
-    scans = need_scans(view, estimator)
+    need_scans(view, estimator)
     odometry = odometry_track(view)
-    local = local_trajectory(scans, odometry)
+    local = local_trajectory_of(view)
     if not len(local.nodes):
         raise NotApplicableError("no scan has enough points to be matched", where=estimator)
     local = replace(local, motion_cov=doubted(local, odometry))
-    motion_scale = view.settings.get(PROCESS_NOISE, 1.0)
-    match_scale = view.settings.get(MEASUREMENT_NOISE, 1.0)
-    config = replace(config, min_score=view.settings.get(MIN_SCORE, config.min_score))
+    motion_scale, match_scale = scales_of(view)
+    config = replace(config, min_score=view.settings.get(MIN_SCORE, 1.0) * config.min_score)
     start = beginning(view, local, config, match_scale)
     maps = submaps(local, config.submap_m, config.apart_m, motion_scale)
     nodes, at = local.node_xyyaw, int(maps.reference[0])

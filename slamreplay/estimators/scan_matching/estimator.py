@@ -15,17 +15,15 @@ from slamreplay.bundle.view import BundleView
 from slamreplay.errors import NotApplicableError, UsageError
 from slamreplay.estimators.inputs import need_scans
 from slamreplay.estimators.parameters import settings_from
+from slamreplay.estimators.scales import MEASUREMENT_NOISE, PROCESS_NOISE, scales_of
 from slamreplay.estimators.scan_matching.config import MatchConfig
 from slamreplay.estimators.scan_matching.drift import drifted, in_frame
 from slamreplay.estimators.scan_matching.ledger import match_innovations
-from slamreplay.estimators.scan_matching.local import local_trajectory
+from slamreplay.estimators.scan_matching.local import local_trajectory_of
 from slamreplay.estimators.scan_matching.trajectory import LocalTrajectory
-from slamreplay.estimators.start import OFFSET, ROTATE, Start, starts
+from slamreplay.estimators.start import MOVED, Start, starts
 from slamreplay.geometry import se2
 from slamreplay.geometry.covariance import turned
-
-#: Settings a perturbation may change: ratios of the covariances of odometry and of matches.
-PROCESS_NOISE, MEASUREMENT_NOISE = "process_noise_scale", "measurement_noise_scale"
 
 
 @dataclass(frozen=True)
@@ -44,9 +42,7 @@ class ScanMatching:
     parameter_names: ClassVar[frozenset[str]] = frozenset(f.name for f in fields(MatchConfig))
     name: ClassVar[str] = "scan_matching"
     needs: ClassVar[frozenset[str]] = frozenset({"scans"})
-    settings: ClassVar[frozenset[str]] = frozenset(
-        {OFFSET, ROTATE, PROCESS_NOISE, MEASUREMENT_NOISE}
-    )
+    settings: ClassVar[frozenset[str]] = MOVED | {PROCESS_NOISE, MEASUREMENT_NOISE}
     without_noise: ClassVar[str] = "what a match weighs is measured on the log, not told"
 
     @classmethod
@@ -76,10 +72,8 @@ class ScanMatching:
         """
         scans = need_scans(view, self.name)
         odometry = odometry_track(view)
-        config = self.config.scaled(
-            view.settings.get(PROCESS_NOISE, 1.0), view.settings.get(MEASUREMENT_NOISE, 1.0)
-        )
-        local = local_trajectory(scans, odometry, config)
+        config = self.config.scaled(*scales_of(view))
+        local = local_trajectory_of(view, config)
         if not len(local.nodes):
             raise NotApplicableError("no scan has enough points to be matched", where=self.name)
         frame, T_frame_local, start = _placed(view, local, odometry)

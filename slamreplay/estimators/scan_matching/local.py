@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from slamreplay.bundle.scans import ScanSet
+from slamreplay.bundle.odometry import odometry_tables, odometry_track
+from slamreplay.bundle.scans import ScanSet, scan_set
 from slamreplay.bundle.track import PoseTrack
+from slamreplay.bundle.view import BundleView
 from slamreplay.estimators.scan_matching.config import MatchConfig
 from slamreplay.estimators.scan_matching.fit import Fit
 from slamreplay.estimators.scan_matching.follower import LEAST_POINTS, Follower
@@ -15,10 +17,27 @@ from slamreplay.geometry import se2
 from slamreplay.geometry.covariance import turned
 from slamreplay.matching.scan_lines import scan_lines
 
-__all__ = ["LocalTrajectory", "MatchConfig", "local_trajectory"]
+__all__ = ["LocalTrajectory", "MatchConfig", "local_trajectory", "local_trajectory_of"]
 
 #: Covariance of a motion that nothing tells.
 UNKNOWN = np.diag([1.0, 1.0, 1.0])
+
+
+def local_trajectory_of(view: BundleView, config: MatchConfig | None = None) -> LocalTrajectory:
+    """Match every scan of a view that has scans, as below.
+
+    It is worked out once for all views that have scans and odometry as recorded: where only the
+    start or a setting is perturbed, every estimator that matches scans goes on from the same.
+    """
+    config = config or MatchConfig()
+
+    def matched(alone: BundleView) -> LocalTrajectory:
+        scans = scan_set(alone)
+        assert scans is not None
+        return local_trajectory(scans, odometry_track(alone), config)
+
+    tables = ["scans", *odometry_tables(view)]
+    return view.shared("local trajectory", tables, matched, by=config)
 
 
 def local_trajectory(

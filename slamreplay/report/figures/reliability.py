@@ -14,7 +14,10 @@ _HEIGHT = 3.6
 
 
 def reliability_figure(
-    record: Reliability, width_in: float, confidence: float | None = None
+    record: Reliability,
+    width_in: float,
+    confidence: float | None = None,
+    answers: str = "moments",
 ) -> Figure | None:
     """Share of right moments over confidence, and how many there were; None without any.
 
@@ -22,6 +25,7 @@ def reliability_figure(
         record: what a benchmark measured.
         width_in: of the paper.
         confidence: of the log at hand, marked if it is given; 0 to 1.
+        answers: what was counted.
     """
     if not record.bins:
         return None
@@ -29,7 +33,7 @@ def reliability_figure(
     figure = canvas.new_figure(width_in, _HEIGHT)
     share, count = figure.subplots(2, 1, sharex=True, height_ratios=[2.6, 1.0])
     canvas.dress(share, "", "was right [share]", size)
-    canvas.dress(count, "said confidence [1]", "moments [1]", size)
+    canvas.dress(count, "said confidence [1]", f"{answers} [1]", size)
     said = np.array([b.said for b in record.bins])
     right = np.array([b.right for b in record.bins])
     share.plot([0.0, 1.0], [0.0, 1.0], color=FAINT, linestyle="--", linewidth=1.0, zorder=2)

@@ -17,7 +17,7 @@ from slamreplay.estimators.ekf.kernels import ACCEPTED
 from slamreplay.estimators.ekf.node import kernels
 from slamreplay.estimators.ekf.node.measurements import Part, parts_of
 from slamreplay.estimators.ekf.node.parameters import NodeParameters
-from slamreplay.estimators.start import GLOBAL, OFFSET, ROTATE, Start, starts
+from slamreplay.estimators.start import GLOBAL, MOVED, Start, starts
 from slamreplay.geometry.times import Times
 
 AXES = ("x m", "y m", "yaw rad", "vx m/s", "vy m/s", "vyaw rad/s", "ax m/s^2", "ay m/s^2")
@@ -127,7 +127,7 @@ def _rows(view: BundleView, parts: Sequence[Part]) -> Times:
 def _start(view: BundleView, parameters: NodeParameters, row_ns: Times, name: str) -> Start | None:
     """The pose that was given to it, where it estimates in the map."""
     is_map = parameters.world_frame == parameters.map_frame
-    if view.settings.get(GLOBAL) or (not is_map and {OFFSET, ROTATE} & set(view.settings)):
+    if view.settings.get(GLOBAL) or (not is_map and not MOVED.isdisjoint(view.settings)):
         what = "cannot find itself" if is_map else "estimates in no map: it has no start to move"
         raise NotApplicableError(what, where=name)
     if not is_map:

@@ -1,0 +1,51 @@
+"""Over the curves of a design: what broke first, each measured by the range that was tried."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from slamreplay.replay.dose import Critical, DoseCurve, DoseResults
+
+
+@dataclass(frozen=True)
+class Margin:
+    """How far one perturbation could be turned up before an estimator broke.
+
+    Levels in s, m, deg and ratios have no common scale. What two of them share is how far each was
+    turned up in this design, so that a margin is no better than the ranges a recipe chose.
+
+    Attributes:
+        estimator: whose.
+        perturbation: `NAME.VARIANT`.
+        unit: of the level.
+        metric: whose limit was crossed at the least level; None where all held.
+        level: at which it was; None where all held.
+        share: of the range from the baseline to the farthest level tried; None where all held.
+    """
+
+    estimator: str
+    perturbation: str
+    unit: str
+    metric: str | None
+    level: float | None
+    share: float | None
+
+
+def ranking(results: DoseResults) -> tuple[Margin, ...]:
+    """Every curve there is, the least margin first; those that held are last."""
+    margins = [_margin(curve) for curve in results.curves if curve.responses]
+    return tuple(sorted(margins, key=lambda m: (m.share is None, m.share or 0.0)))
+
+
+def critical_of_first(curve: DoseCurve) -> Critical | None:
+    """The critical level of what broke first; None where nothing did."""
+    return next((c for c in curve.critical if c.metric == curve.broke_first), None)
+
+
+def _margin(curve: DoseCurve) -> Margin:
+    first = critical_of_first(curve)
+    level = None if first is None else first.level
+    farthest = abs(curve.responses[-1].level - curve.baseline)
+    share = None if level is None else abs(level - curve.baseline) / farthest
+    return Margin(curve.estimator, curve.perturbation, curve.unit,
+                  curve.broke_first, level, share)  # fmt: skip

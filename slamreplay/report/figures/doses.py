@@ -1,0 +1,219 @@
+"""Dose and response as small multiples: a panel a perturbation, a line an estimator."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from statistics import median
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+from slamreplay.geometry.se2 import Array
+from slamreplay.replay.dose import DoseCurve, DoseResults, Limit
+from slamreplay.report.figures import canvas
+from slamreplay.report.figures.canvas import (
+    BLUE,
+    FAINT,
+    GREEN,
+    INK,
+    ORANGE,
+    PURPLE,
+    SKY,
+    VERMILLION,
+)
+
+#: A level to its place on the axis.
+Place = Callable[[float], float]
+
+_SIZE = 9.5
+_COLUMNS = 3
+_LOOKS = [(BLUE, "o"), (VERMILLION, "s"), (GREEN, "D"), (PURPLE, "^"), (ORANGE, "v"), (SKY, "P")]
+#: From this many limits on a response is drawn on a logarithmic axis beyond the limit.
+_FAR = 4.0
+
+
+def doses_figure(results: DoseResults, words: dict[str, str], width_in: float = 11.0) -> Figure:
+    """The response of the first limit's metric against the level.
+
+    Args:
+        results: of a design.
+        words: by `NAME.VARIANT`, what the level does, in a few words.
+        width_in: of the paper; narrow paper has one panel a row.
+    """
+    limit = results.limits[0]
+    panels = _panels(results.curves)
+    columns = 1 if width_in < 5.0 else min(_COLUMNS, len(panels))
+    rows = -(-len(panels) // columns)
+    figure = canvas.new_figure(width_in, 0.7 + 3.1 * rows)
+    every = figure.subplots(rows, columns, squeeze=False).ravel()
+    names = list(dict.fromkeys(curve.estimator for curve in results.curves))
+    looks = {name: _LOOKS[k % len(_LOOKS)] for k, name in enumerate(names)}
+    top = _top(results.curves, limit)
+    for k, axes in enumerate(every):
+        if k >= len(panels):
+            axes.set_visible(False)
+            continue
+        _panel(axes, panels[k], limit, looks, top)
+        first = panels[k][0]
+        axes.set_title(first.perturbation, loc="left", fontsize=_SIZE + 1, color=INK,
+                       weight="bold", pad=20)  # fmt: skip
+        axes.text(0.0, 1.02, words.get(first.perturbation, ""), transform=axes.transAxes,
+                  fontsize=_SIZE - 1.5, color=FAINT, va="bottom")  # fmt: skip
+        if k % columns:
+            axes.set_ylabel("")
+    canvas.legend(figure, _handles(looks, limit, results), _SIZE, 1 if columns == 1 else 3)
+    return figure
+
+
+def _panels(curves: Sequence[DoseCurve]) -> list[list[DoseCurve]]:
+    """Curves of one perturbation on one side of its baseline, in the design's order."""
+    found: dict[tuple[str, bool], list[DoseCurve]] = {}
+    for curve in curves:
+        if curve.responses:
+            found.setdefault((curve.perturbation, _is_below(curve)), []).append(curve)
+    return list(found.values()) or [[curve] for curve in curves[:1]]
+
+
+def _is_below(curve: DoseCurve) -> bool:
+    return bool(curve.responses) and curve.responses[-1].level < curve.baseline
+
+
+def _top(curves: Sequence[DoseCurve], limit: Limit) -> float:
+    values = [v for c in curves for r in c.responses for v in r.values.get(limit.metric, ())]
+    return max([limit.at_most, *(v for v in values if v is not None)])
+
+
+def _panel(
+    axes: Axes,
+    curves: Sequence[DoseCurve],
+    limit: Limit,
+    looks: dict[str, tuple[str, str]],
+    top: float,
+) -> None:
+    unit = curves[0].unit
+    canvas.dress(axes, f"level [{unit}]", _label(limit), _SIZE)
+    place = _place_of(curves)
+    for k, curve in enumerate(curves):
+        colour, marker = looks[curve.estimator]
+        _line(axes, curve, limit, place, colour, marker)
+        critical = next((c for c in curve.critical if c.metric == limit.metric), None)
+        if critical is None or critical.level is None or critical.outcome == "always":
+            continue
+        at = place(critical.level)
+        axes.axvline(at, color=colour, lw=1.0, ls=(0, (2, 2)), zorder=3)
+        low = at if critical.low is None else place(critical.low)
+        ends = [low, axes.get_xlim()[1] if critical.high is None else place(critical.high)]
+        y = _mark_at(limit, top, k)
+        axes.plot(ends, [y, y], color=colour, lw=5.0, alpha=0.45, solid_capstyle="butt", zorder=5)
+        axes.plot([at], [y], marker="|", ms=11, mew=2.2, color=colour, zorder=6)
+    axes.axhline(limit.at_most, color=INK, lw=1.2, ls=(0, (6, 3)), zorder=2)
+    _scale(axes, limit, top)
+    _ticks(axes, curves, place)
+
+
+def _line(
+    axes: Axes, curve: DoseCurve, limit: Limit, place: Place, colour: str, marker: str
+) -> None:
+    """Through the levels that every seed has; seeds that went on by themselves are dots.
+
+    A search sends a seed to a level because of what it did beside it: a median there would be of
+    the chosen ones.
+    """
+    rows, alone = [], []
+    for response in curve.responses:
+        values = response.values.get(limit.metric, ())
+        known = [v for v in values if v is not None]
+        if known and len(known) == len(values):
+            rows.append((place(response.level), median(known), min(known), max(known)))
+        alone += [(place(response.level), v) for v in known if len(known) < len(values)]
+    if rows:
+        x, middle, low, high = np.array(rows).T
+        axes.fill_between(x, low, high, color=colour, alpha=0.16, lw=0.0, zorder=2)
+        axes.plot(x, middle, color=colour, marker=marker, ms=4.5, lw=1.6, zorder=4)
+    if alone:
+        axes.plot(*np.array(alone).T, color=colour, marker=marker, ms=3.0, lw=0.0, alpha=0.55,
+                  zorder=4)  # fmt: skip
+
+
+def _place_of(curves: Sequence[DoseCurve]) -> Place:
+    """Where levels go by factors, their logarithms, with the baseline a step to the left."""
+    baseline = curves[0].baseline
+    if not curves[0].by_factor:
+        return lambda level: level
+    first = min(abs(r.level - baseline) for c in curves for r in c.responses[1:])
+    far = max(abs(r.level - baseline) for c in curves for r in c.responses[1:])
+    left = math.log10(first) - 0.12 * max(math.log10(far / first), 1.0)
+
+    def place(level: float) -> float:
+        return left if level == baseline else math.log10(abs(level - baseline))
+
+    return place
+
+
+def _ticks(axes: Axes, curves: Sequence[DoseCurve], place: Place) -> None:
+    baseline, side = curves[0].baseline, -1.0 if _is_below(curves[0]) else 1.0
+    if not curves[0].by_factor:
+        if side < 0.0:
+            axes.invert_xaxis()
+        return
+    offsets = sorted({abs(r.level - baseline) for c in curves for r in c.responses[1:]})
+    decades = range(math.floor(math.log10(offsets[0])), math.ceil(math.log10(offsets[-1])) + 1)
+    tidy = [m * 10.0**e for e in decades for m in (1.0, 3.0)]
+    shown = [t for t in tidy if offsets[0] * 0.999 <= t <= offsets[-1] * 1.001]
+    levels = [baseline, *(float(f"{baseline + side * t:.6g}") for t in shown)]
+    axes.set_xticks([place(level) for level in levels], [f"{level:g}" for level in levels])
+
+
+def _scale(axes: Axes, limit: Limit, top: float) -> None:
+    """One scale for all panels: beyond the limit by factors where responses go far."""
+    if limit.at_most > 0.0 and top > _FAR * limit.at_most:
+        axes.set_yscale("symlog", linthresh=limit.at_most, linscale=0.8)
+        steps = limit.at_most * 10.0 ** np.arange(0.5, 12.0, 0.5)
+        axes.set_yticks([0.0, limit.at_most, *_shown(steps[steps < 1.3 * top])])
+        axes.yaxis.set_major_formatter(lambda value, _: f"{value:.2g}")
+        axes.minorticks_off()
+        axes.set_ylim(-0.08 * limit.at_most, 1.6 * top)
+    else:
+        axes.set_ylim(-0.03 * max(top, 1e-9), 1.12 * max(top, 1e-9))
+
+
+def _shown(steps: Array) -> list[float]:
+    return [float(f"{step:.2g}") for step in steps]
+
+
+def _mark_at(limit: Limit, top: float, k: int) -> float:
+    """Where an interval is drawn: under the limit, one below the other."""
+    reach = limit.at_most if limit.at_most > 0.0 else top
+    return reach * (0.88 - 0.13 * k)
+
+
+def _label(limit: Limit) -> str:
+    name, _, unit = limit.metric.rpartition("_")
+    if unit in ("m", "s", "deg", "rad"):
+        return f"{name.replace('_', ' ')} [{unit}]"
+    return f"{limit.metric.replace('_', ' ')} [1]"
+
+
+def _handles(looks: dict[str, tuple[str, str]], limit: Limit, results: DoseResults) -> list[object]:
+    several = any(len(curve.seeds) > 1 for curve in results.curves)
+    lines = [
+        Line2D([], [], color=colour, marker=marker, ms=4.5, lw=1.6,
+               label=f"{name}, median over seeds" if several else name)
+        for name, (colour, marker) in looks.items()
+    ]  # fmt: skip
+    band: list[object] = []
+    if several:
+        band = [Patch(color=FAINT, alpha=0.3, label="least to most over seeds"),
+                Line2D([], [], color=FAINT, marker="o", ms=3.0, lw=0.0,
+                       label="single seeds, where the search took them")]  # fmt: skip
+    return [
+        *lines,
+        *band,
+        Line2D([], [], color=INK, lw=1.2, ls=(0, (6, 3)), label=f"limit: {limit.title}"),
+        Line2D([], [], color=FAINT, lw=5.0, alpha=0.6, marker="|", ms=11, mew=2.2,
+               label="critical level and its interval"),
+    ]  # fmt: skip

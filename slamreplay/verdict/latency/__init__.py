@@ -1,0 +1,1 @@
+"""How old the pose was when planner and controller used it, and what an added stage would do."""
