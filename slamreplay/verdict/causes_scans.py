@@ -50,17 +50,22 @@ def late(case: Case, onset: int) -> Answer | None:
 
 def changed_map(case: Case, onset: int) -> Answer | None:
     """The map was no longer true where the belief left the truth."""
-    near = [
+    near = near_change(case, onset)
+    if not near:
+        return None
+    text = f"the belief left the truth at {case.seconds(onset)}, where the map was no longer true"
+    return "stale_map_use", 0.6, [text, *changed_words(near, case.hindsight, case.start_ns)]
+
+
+def near_change(case: Case, onset: int) -> list[Interval]:
+    """The intervals around a time in which the map was contradicted."""
+    return [
         i
         for i in case.intervals
         if i.is_changed
         and i.start_ns <= onset + CHANGED_AFTER_NS
         and i.end_ns >= onset - CHANGED_BEFORE_NS
     ]
-    if not near:
-        return None
-    text = f"the belief left the truth at {case.seconds(onset)}, where the map was no longer true"
-    return "stale_map_use", 0.6, [text, *changed_words(near, case.hindsight, case.start_ns)]
 
 
 def pulled(case: Case, lost: Interval, onset: int, least_m: float) -> Answer | None:
