@@ -29,6 +29,8 @@ from slamreplay.replay.metrics import trial_metrics
 from slamreplay.replay.parameters import configured
 from slamreplay.report.evidence import Postmortem, TrialResult
 from slamreplay.report.metrics import asked_of, run_metrics
+from slamreplay.rootcause.answer import root_cause
+from slamreplay.rootcause.mode import mode_of
 from slamreplay.verdict.judge import judge
 from slamreplay.verdict.latency.findings import late_findings
 from slamreplay.verdict.latency.latency import latency, usages
@@ -49,6 +51,7 @@ def postmortem(
     correct_map: bool = False,
     trace_ns: int | None = None,
     design: DoseResults | None = None,
+    cause: bool = True,
     progress: Callable[[str, float], None] | None = None,
 ) -> Postmortem:
     """Look back on one log.
@@ -65,6 +68,7 @@ def postmortem(
         correct_map: propose a corrected map, too.
         design: what the runs were laid out by, where it was a recipe.
         trace_ns: a moment around which to tell which measurements moved the belief.
+        cause: replay what went wrong with one thing put right at a time.
         progress: told what is being done, and the share done from 0 to 1.
     """
     limits = Limits() if limits is None else limits
@@ -78,6 +82,16 @@ def postmortem(
     say("verdict", _HINDSIGHT_SHARE)
     belief = recorded_belief(view, belief_times(view))
     judgement = judge(view, belief, found, limits)
+    began = None
+    if cause:
+        say("root cause", 0.92)
+        began = root_cause(view, belief, found, limits)
+    if began is not None:
+        mode = mode_of(began, judgement.failure_mode)
+        if mode.kind == judgement.failure_mode.kind:
+            judgement = replace(judgement, failure_mode=mode)
+        else:  # the summary and the stops tell of it, too
+            judgement = judge(view, belief, found, limits, mode)
     say("checks", 0.95)
     references = references_of(bundle, found)
     context = CheckContext(belief, references, view)
@@ -137,6 +151,7 @@ def postmortem(
         recorded=recorded,
         jumps=tuple((asked_run.trial, jumps_of(asked)) for asked_run, asked in everybody),
         trace_ns=trace_ns,
+        root_cause=began,
         latency=late,
         usages=used,
     )

@@ -168,7 +168,8 @@ def test_report_json_has_the_contracts_keys_and_is_valid(post, bare):
         jsonschema.validate(content, schema)
         assert list(content) == [
             "schema_version", "slamreplay", "bundle", "verdict", "intervals", "changed_regions",
-            "reference", "failure_mode", "stops", "actions", "findings", "trials", "design",
+            "reference", "failure_mode", "root_cause", "stops", "actions", "findings", "trials",
+            "design",
             "ledger", "jumps", "trace", "latency",
         ]  # fmt: skip
         assert Report.model_validate_json(build(each).json_text()) == build(each)

@@ -57,5 +57,21 @@ def by_rules(log: JudgedLog) -> Answer:
     return Answer(mode.kind, mode.confidence, ranked, 0, "; ".join(mode.evidence))
 
 
+def by_replays(log: JudgedLog) -> Answer:
+    """The single thing that, put back into healed evidence, reproduces what was seen."""
+    from slamreplay.rootcause.answer import root_cause
+
+    found = root_cause(log.view, log.belief, log.hindsight)
+    if found is None:
+        return Answer("none", None, ())
+    shares: dict[FailureKind, float] = {}
+    for one in found.candidates:
+        shares[one.kind] = shares.get(one.kind, 0.0) + one.probability
+    ranked = tuple(sorted(shares.items(), key=lambda item: -item[1]))
+    best = [one.text for one in found.candidates if one.kind == found.began_as][:1]
+    text = "; ".join([*best, *([found.reason] if found.reason else [])])
+    return Answer(found.began_as, found.probability, ranked, found.trials, text)
+
+
 #: By the name that the command line takes.
-ANSWERERS: dict[str, Answerer] = {"rules": by_rules}
+ANSWERERS: dict[str, Answerer] = {"rules": by_rules, "replays": by_replays}

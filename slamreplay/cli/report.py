@@ -67,6 +67,14 @@ Trace = Annotated[
     ),
 ]
 
+Cause = Annotated[
+    bool,
+    typer.Option(
+        "--cause/--no-cause",
+        help="Replay what went wrong with one thing put right at a time, to name its root cause.",
+    ),
+]
+
 HoldOut = Annotated[
     list[str] | None,
     typer.Option(
@@ -96,6 +104,7 @@ def _report(
     update_map: UpdateMap = None,
     trace: Trace = None,
     hold_out: HoldOut = None,
+    cause: Cause = True,
     fail_on: FailOn = None,
     as_json: Json = False,
 ) -> None:
@@ -137,6 +146,7 @@ def _report(
                 correct_map=update_map is not None,
                 trace_ns=trace_ns,
                 design=design,
+                cause=cause,
                 progress=progress,
             )
             page = write_report(post, output)
@@ -200,6 +210,10 @@ def _summarise(post: Postmortem, page: Path) -> None:
     mode = judgement.failure_mode
     if mode.kind != "none":
         console.print(Text(f"failure mode: {FAILURE_MODES[mode.kind]}"))
+    cause = post.root_cause
+    if cause is not None and cause.trials:
+        likely = f"{FAILURE_MODES[cause.began_as]}, {percent(cause.probability)}"
+        console.print(Text(f"root cause: {likely}, by {cause.trials} replays"))
     missing = post.manifest.missing_parts()
     if missing:
         console.print(Text(f"missing: {', '.join(missing)}", style="dim"))

@@ -16,16 +16,19 @@ from slamreplay.report.model import (
     ActionPart,
     BeliefPart,
     BundlePart,
+    CandidatePart,
     FailureModePart,
     FindingPart,
     IntervalPart,
     ReferencePart,
     RegionPart,
     Report,
+    RootCausePart,
     StopPart,
     TrialPart,
     VerdictPart,
 )
+from slamreplay.rootcause.result import RootCause
 from slamreplay.verdict.judgement import Consumed
 
 TRAJECTORY_FILE = "hindsight.tum"
@@ -75,6 +78,7 @@ def build(post: Postmortem) -> Report:
         failure_mode=FailureModePart(
             kind=mode.kind, confidence=mode.confidence, evidence=list(mode.evidence)
         ),
+        root_cause=_root_cause(post.root_cause),
         stops=[StopPart(**_picked(s, StopPart)) for s in judgement.stops],
         actions=[
             ActionPart(**_picked(a, ActionPart, belief=_belief(a.belief)))
@@ -120,6 +124,13 @@ def _reference(post: Postmortem) -> ReferencePart:
         sigma_m=hindsight.sigma_m,
         coverage=hindsight.coverage,
     )
+
+
+def _root_cause(cause: RootCause | None) -> RootCausePart | None:
+    if cause is None:
+        return None
+    candidates = [CandidatePart(**_picked(one, CandidatePart)) for one in cause.candidates]
+    return RootCausePart(**_picked(cause, RootCausePart, candidates=candidates))
 
 
 def _finding(finding: Finding) -> FindingPart:

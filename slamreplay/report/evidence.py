@@ -25,6 +25,7 @@ from slamreplay.maps.grid import OccupancyGrid
 from slamreplay.replay.dose import DoseResults
 from slamreplay.report.ledger import LedgerSet, ledger_sets
 from slamreplay.report.trace import RunTrace, trace
+from slamreplay.rootcause.result import RootCause
 from slamreplay.verdict.judgement import ConstantOffset, Judgement
 from slamreplay.verdict.latency.latency import Latency, Usage
 from slamreplay.verdict.limits import Limits
@@ -62,6 +63,8 @@ class Postmortem:
         recorded: the localizer of the log as runs, its ledger with what the log holds near it.
         jumps: of each run, the recorded ones first, the steps of its path and their causes.
         trace_ns: the moment around which is asked what moved the belief, None if nobody asked.
+        root_cause: which single thing reproduces what went wrong; None where nothing did, or nobody
+            asked.
         latency: how old the pose was whenever it was used, None where that was not asked.
         usages: the same in a few numbers, by consumer.
         slam: the map and the graph that the undisturbed run of `pose_graph` made.
@@ -86,6 +89,7 @@ class Postmortem:
     recorded: tuple[Run, ...] = ()
     jumps: tuple[tuple[Trial, tuple[Jump, ...]], ...] = ()
     trace_ns: int | None = None
+    root_cause: RootCause | None = None
     latency: Latency | None = None
     usages: tuple[Usage, ...] = ()
     slam: MapAndGraph | None = None

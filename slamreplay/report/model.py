@@ -113,6 +113,38 @@ class FailureModePart(_Strict):
     evidence: list[Text]
 
 
+class CandidatePart(_Strict):
+    """One cause that was tried: `level` of `perturbation`, put into healed evidence at `start_ns`.
+
+    These are null where no perturbation stands for it, where it has no size, where it acted all
+    along. `log_likelihood` in nats: only differences mean anything. `text` says what it did.
+    """
+
+    kind: FailureKind
+    perturbation: str | None
+    level: Number
+    unit: Text
+    start_ns: Count
+    log_likelihood: Number
+    probability: Share
+    text: Text
+
+
+class RootCausePart(_Strict):
+    """Which single thing reproduces what went wrong, the most probable first; null: nothing did.
+
+    `probability` is of `began_as`; `trials` counts replays; `reason` says why nothing was tried.
+    """
+
+    start_ns: Ns
+    end_ns: Ns
+    began_as: FailureKind
+    probability: Share
+    candidates: list[CandidatePart]
+    trials: Ns
+    reason: Text
+
+
 class StopPart(_Strict):
     """An unplanned stop: when, where the robot really was (null: not known), state, first cause."""
 
@@ -427,6 +459,7 @@ class Report(_Strict):
     changed_regions: list[RegionPart]
     reference: ReferencePart
     failure_mode: FailureModePart
+    root_cause: RootCausePart | None
     stops: list[StopPart]
     actions: list[ActionPart]
     findings: list[FindingPart]

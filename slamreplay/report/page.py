@@ -10,6 +10,7 @@ from slamreplay.bundle.manifest import Manifest, MapVersion
 from slamreplay.geometry.times import NS_PER_S
 from slamreplay.report import consistency_tables, designs, phrases, tables, trace_tables
 from slamreplay.report.assess import not_assessable, title_of
+from slamreplay.report.cause_table import cause_note, causes
 from slamreplay.report.evidence import Postmortem
 from slamreplay.report.facts import Fact, deciding_facts
 from slamreplay.report.finding_rows import FindingRow, finding_rows
@@ -39,6 +40,8 @@ class Page:
     facts: tuple[Fact, ...]
     failure_mode: str
     evidence: tuple[str, ...]
+    causes: Table
+    cause_note: str
     lacking: tuple[str, ...]
     bands: tuple[Band, ...]
     marks: tuple[Band, ...]
@@ -102,6 +105,8 @@ def page(post: Postmortem) -> Page:
         facts=deciding_facts(post),
         failure_mode=_failure_mode(post),
         evidence=judgement.failure_mode.evidence,
+        causes=causes(post),
+        cause_note=cause_note(post),
         lacking=judgement.lacking,
         bands=bands(post),
         marks=marks(post),

@@ -10,14 +10,14 @@ from slamreplay.bundle.products import Hindsight
 from slamreplay.bundle.track import PoseTrack
 from slamreplay.bundle.view import BundleView
 from slamreplay.estimators.amcl.config import AmclConfig
-from slamreplay.rootcause.calibration import Calibration, shipped_calibration
+from slamreplay.rootcause.calibration import Calibration, key_of, shipped_calibration
 from slamreplay.rootcause.healing import Healed, healed
 from slamreplay.rootcause.incident import Incident, incident_of
 from slamreplay.rootcause.likelihood import moments
 from slamreplay.rootcause.result import Candidate, RootCause
 from slamreplay.rootcause.trying import Tried, tried_of
 from slamreplay.verdict.belief_error import belief_error
-from slamreplay.verdict.judgement import Interval
+from slamreplay.verdict.judgement import FailureKind, Interval
 from slamreplay.verdict.limits import Limits
 from slamreplay.verdict.looked_at import Looked, looked_at
 
@@ -70,7 +70,9 @@ def _of(
     put_right = healed(incident, AmclConfig())
     if put_right is None:
         return _told(looked, weights)
-    return _answer(incident, put_right, tried_of(incident, put_right, looked), weights)
+    tried = tried_of(incident, put_right, looked)
+    chance = weights.probabilities(tried, looked.mode.kind)
+    return _answer(incident, put_right, tried, chance)
 
 
 def _incident(
@@ -106,24 +108,25 @@ def _told(looked: Looked, weights: Calibration) -> RootCause | None:
 
 
 def _answer(
-    incident: Incident, put_right: Healed, tried: list[Tried], weights: Calibration
+    incident: Incident, put_right: Healed, tried: list[Tried], chance: list[float]
 ) -> RootCause:
-    chance = weights.probabilities(tried)
-    order = sorted(range(len(tried)), key=lambda k: -chance[k])
-    candidates = tuple(_candidate(incident, put_right, tried, k, chance[k]) for k in order)
-    by_kind: dict[str, float] = {}
-    for one in candidates:
-        by_kind[one.kind] = by_kind.get(one.kind, 0.0) + one.probability
-    best = max(candidates, key=lambda one: by_kind[one.kind])
-    replays = {id(r) for one in tried for r in one.replays}
-    return RootCause(
-        incident.onset_ns,
-        int(incident.t_ns[-1]),
-        best.kind,
-        min(by_kind[best.kind], 1.0),
-        candidates,
-        len(replays),
-    )
+    """One candidate per kind and perturbation: of several levels the one that fits best."""
+    groups: dict[str, list[int]] = {}
+    for k, one in enumerate(tried):
+        groups.setdefault(key_of(one), []).append(k)
+    found = []
+    for rows in groups.values():
+        best = max(rows, key=lambda k: chance[k])
+        p = sum(chance[k] for k in rows)
+        found.append(_candidate(incident, put_right, tried, best, p))
+    found.sort(key=lambda one: -one.probability)
+    by_kind: dict[FailureKind, float] = {}
+    for each in found:
+        by_kind[each.kind] = by_kind.get(each.kind, 0.0) + each.probability
+    kind = max(by_kind, key=lambda k: by_kind[k])
+    replays = {id(replay) for one in tried for replay in one.replays if replay.by_chance}
+    start, end = incident.onset_ns, int(incident.t_ns[-1])
+    return RootCause(start, end, kind, min(by_kind[kind], 1.0), tuple(found), len(replays))
 
 
 def _candidate(

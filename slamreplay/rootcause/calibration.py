@@ -11,6 +11,11 @@ from types import MappingProxyType
 import numpy as np
 
 from slamreplay.rootcause.trying import Tried
+from slamreplay.verdict.judgement import FailureKind
+
+#: Probability that what happened is none of what was tried, shared evenly: simulations cannot tell
+#: 0.99 from 0.999, and real logs fail in ways that none shows.
+UNFORESEEN = 0.02
 
 
 @dataclass(frozen=True)
@@ -20,20 +25,33 @@ class Calibration:
     Attributes:
         slope: of the log likelihood: one over the temperature.
         bias: what is added to a trial's score, by `key_of`; nats.
+        rule: what is added where the verdict's own failure mode is of the trial's kind; nats.
         unplayed: probability of a failure mode that no replay was asked about, by kind.
     """
 
     slope: float = 0.5
     bias: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
+    rule: float = 0.0
     unplayed: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
 
-    def probabilities(self, tried: Sequence[Tried]) -> list[float]:
-        """Of each trial; they sum to 1."""
+    def probabilities(self, tried: Sequence[Tried], rule: FailureKind) -> list[float]:
+        """Of each trial; they sum to 1.
+
+        Args:
+            tried: with their likelihoods.
+            rule: the verdict's failure mode, which no replay was asked for.
+        """
         scores = np.array(
-            [self.slope * t.log_likelihood + self.bias.get(key_of(t), 0.0) for t in tried]
+            [
+                self.slope * t.log_likelihood
+                + self.bias.get(key_of(t), 0.0)
+                + (self.rule if t.trial.kind == rule else 0.0)
+                for t in tried
+            ]
         )
         chance = np.exp(scores - scores.max())
-        return (chance / chance.sum()).tolist()
+        chance = (1.0 - UNFORESEEN) * chance / chance.sum() + UNFORESEEN / len(chance)
+        return [float(p) for p in chance]
 
 
 def key_of(tried: Tried) -> str:
@@ -48,4 +66,4 @@ def shipped_calibration() -> Calibration:
     if not file.is_file():
         return Calibration()
     record = json.loads(file.read_text("utf-8"))
-    return Calibration(record["slope"], record["bias"], record["unplayed"])
+    return Calibration(record["slope"], record["bias"], record["rule"], record["unplayed"])

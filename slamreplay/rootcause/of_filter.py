@@ -21,6 +21,9 @@ _TRUSTS, _FEW = (0.03, 0.003, 0.0005), 70
 #: A step of the belief that neither robot nor wheels made, m or rad in all, so long before the
 #: onset and after it.
 _JUMP, _BEFORE_NS, _AFTER_NS = 0.2, 5 * NS_PER_S, NS_PER_S
+#: Where it jumped to is taken from what was seen: of all places within some metres and headings,
+#: nats, that one was chosen.
+_CHOSEN = -8.0
 
 
 def trusts(incident: Incident, healed: Healed) -> Iterator[Trial]:
@@ -76,4 +79,4 @@ def jumps(incident: Incident, healed: Healed) -> Iterator[Trial]:
     told = replace(healed.evidence, set_again=((row, belief[row], 0.25 * START_COV),))
     metres = float(np.hypot(off[k, 0], off[k, 1]))
     words = f"one match {metres:.2f} m elsewhere at {incident.case.seconds(int(t[row]))}"
-    yield Trial("", "association_error", metres, "m", row, words, told)
+    yield Trial("", "association_error", metres, "m", row, words, told, log_dose=_CHOSEN)

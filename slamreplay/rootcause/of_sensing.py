@@ -12,11 +12,14 @@ from slamreplay.geometry.times import NS_PER_S, ns
 from slamreplay.rootcause.healing import Healed
 from slamreplay.rootcause.incident import Incident
 from slamreplay.rootcause.trial import Trial
+from slamreplay.verdict.causes_scans import near_change
 from slamreplay.verdict.judgement import ConstantOffset
 from slamreplay.verdict.scan_gaps import scan_gaps
 
 #: Scans of which so much was cut short, for so long, are worth a try.
 _CUT, _CUT_ROWS = 0.2, 10
+#: Log odds of a map that is contradicted where the belief left the truth.
+_CHANGED = 3.0
 
 
 def clocks(incident: Incident, healed: Healed) -> Iterator[Trial]:
@@ -50,7 +53,7 @@ def gaps(incident: Incident, healed: Healed) -> Iterator[Trial]:
     yield Trial("scan_drop.burst", "timing", seconds, "s", at, f"missing scans ({words})", told)
 
 
-def people(healed: Healed) -> Iterator[Trial]:
+def people(incident: Incident, healed: Healed) -> Iterator[Trial]:
     """The beams that something cut short which is in no map."""
     with np.errstate(invalid="ignore"):
         cut = healed.cut_share >= _CUT
@@ -60,8 +63,10 @@ def people(healed: Healed) -> Iterator[Trial]:
     share = float(np.mean(healed.cut_share[rows]))
     words = f"what cut {100 * share:.0f} % of the beams short"
     told = replace(healed.evidence, beams=healed.told_beams)
-    row = int(rows[0])
-    yield Trial("people.crowd", "association_error", share, "ratio", row, words, told)
+    # What stands where the map has nothing cuts beams, too.
+    odds = -_CHANGED if near_change(incident.case, incident.onset_ns) else 0.0
+    name, row = "people.crowd", int(rows[0])
+    yield Trial(name, "association_error", share, "ratio", row, words, told, log_dose=odds)
 
 
 def maps(incident: Incident, healed: Healed, offset: ConstantOffset | None) -> Iterator[Trial]:
@@ -71,8 +76,10 @@ def maps(incident: Incident, healed: Healed, offset: ConstantOffset | None) -> I
     if changes is not None and not np.array_equal(e.grid.cells, old.cells):
         area = sum(r.area_m2 for r in changes.regions)
         words = f"the map as the robot had it, {area:.1f} m² of which is no longer true"
-        yield Trial("map_stale.version", "stale_map_use", area, "m2", None, words,
-                    replace(e, grid=old))  # fmt: skip
+        odds = _CHANGED if near_change(incident.case, incident.onset_ns) else -1.0
+        told = replace(e, grid=old)
+        name = "map_stale.version"
+        yield Trial(name, "stale_map_use", area, "m2", None, words, told, log_dose=odds)
     if offset is not None and offset.cause == "map":
         words = f"a map that lies elsewhere ({offset.text})"
         said = se2.compose(np.array(offset.xyyaw), healed.truth)

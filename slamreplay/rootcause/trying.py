@@ -54,7 +54,7 @@ def _trials(
     yield from of_motion.motions(incident, put_right)
     yield from of_sensing.clocks(incident, put_right)
     yield from of_sensing.gaps(incident, put_right)
-    yield from of_sensing.people(put_right)
+    yield from of_sensing.people(incident, put_right)
     yield from of_sensing.maps(incident, put_right, offset)
     yield from of_filter.trusts(incident, put_right)
     yield from of_filter.uncorrected(incident, put_right)

@@ -24,7 +24,11 @@ from slamreplay.verdict.summary import summary
 
 
 def judged_apart(
-    view: BundleView, belief: PoseTrack | None, hindsight: Hindsight, limits: Limits
+    view: BundleView,
+    belief: PoseTrack | None,
+    hindsight: Hindsight,
+    limits: Limits,
+    began: FailureMode | None = None,
 ) -> Judgement:
     """Intervals, causes and offsets of each stretch; stops and actions of the whole log.
 
@@ -36,6 +40,7 @@ def judged_apart(
         belief: as in `judge`.
         hindsight: with the parts it was joined from.
         limits: thresholds.
+        began: as in `judge`.
     """
     looked: list[Looked] = []
     errors: list[BeliefError] = []
@@ -56,7 +61,7 @@ def judged_apart(
         findings += motion_findings(stretch, found.delay, found.turned)
     intervals = joined([found.intervals for found in looked])
     state = log_state(intervals, limits)
-    mode = _mode(looked)
+    mode = began or _mode(looked)
     found_stops = stops(view, belief, hindsight.track, intervals, mode)
     done = actions(view, belief, limits, Outcome(_joined(errors), intervals))
     start_ns = view.manifest.start_ns

@@ -11,7 +11,7 @@ from slamreplay.bundle.odometry import odometry_track
 from slamreplay.bundle.products import Hindsight
 from slamreplay.bundle.view import BundleView
 from slamreplay.geometry import se2
-from slamreplay.geometry.times import NS_PER_S
+from slamreplay.geometry.times import NS_PER_S, ns
 from slamreplay.verdict.belief_error import BeliefError
 from slamreplay.verdict.judgement import FailureKind, Interval
 from slamreplay.verdict.limits import Limits
@@ -74,6 +74,20 @@ class Case:
         """(N, 3) odometry at the rows of `error`, None where the log has none."""
         odometry = odometry_track(self.view)
         return None if odometry is None else odometry.at(self.error.t_ns).xyyaw
+
+    def odometry_in_time(self) -> se2.Array | None:
+        """(N, 3) odometry at the moments that the rows of `error` show, and to scale.
+
+        Clocks and calibration are causes by themselves: what is left of a difference to where the
+        robot was is something that happened to it.
+        """
+        odometry = odometry_track(self.view)
+        if odometry is None:
+            return None
+        delay = self.delay
+        late_ns = ns(delay.seconds) if delay is not None and delay.is_significant else 0
+        told = odometry.at(self.error.t_ns - late_ns).xyyaw
+        return told if self.wheels is None else self.wheels.mended(told)
 
     def resets(self, onset: int) -> se2.Array:
         """Times of the poses that somebody set around the time at which the belief went wrong."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from slamreplay.geometry.times import NS_PER_S
+from slamreplay.verdict import causes_motion
 from slamreplay.verdict.case import LASTING_NS, Answer, Case
 from slamreplay.verdict.cloud import right_cloud_m
 from slamreplay.verdict.fit_at import fits_at_belief
@@ -17,6 +18,9 @@ from slamreplay.verdict.map_frame import LOOKALIKE
 
 #: Lost this soon after the first belief is lost from the start.
 START_NS = 3 * NS_PER_S
+#: A pose told with this standard deviation, m, is known to an aisle at best; one within so many of
+#: them was told honestly.
+VAGUE_M, HONEST = 1.0, 3.0
 
 
 def told_otherwise(case: Case, lost: Interval) -> Answer | None:
@@ -38,10 +42,20 @@ def from_the_start(case: Case, lost: Interval, onset: int) -> Answer | None:
     rows = np.flatnonzero(error.spoken & error.known & np.isfinite(error.distance_m))
     if not len(rows) or onset - int(error.t_ns[rows[0]]) > START_NS:
         return None
+    first = int(error.t_ns[error.spoken][0])
+    if onset - first > START_NS and causes_motion.moved_otherwise(case, onset) is not None:
+        return None  # nothing is known of its first moments, and something else of later ones
     at = int(np.clip(np.searchsorted(error.t_ns, onset), 0, len(error.t_ns) - 1))
     metres, radians = error.distance_m[at], error.heading_rad[at]
     beyond = max(metres / case.limits.position_m, radians / case.limits.yaw_rad)
     far = f"{metres:.2f} m and {np.degrees(radians):.0f} deg"
+    vague = _told_vaguely(case, rows[0])
+    if vague is not None:
+        text = (
+            f"the first pose was {far} off and told to within {vague:.1f} m: scans had to decide, "
+            "and more than one place looked alike to them"
+        )
+        return "sensing_ambiguity", 0.6, [text]
     words = [f"the first belief was already {far} from where the robot was"]
     # Just over the line for a moment is what a careful click and a filter that settles look like.
     sure = float(np.clip(0.4 + 0.5 * (beyond - 1.0), 0.4, 0.9))
@@ -58,6 +72,17 @@ def from_the_start(case: Case, lost: Interval, onset: int) -> Answer | None:
     ):
         words.append("the place it believed to be in looks much like the one it was in")
     return "wrong_initial_pose", sure, words
+
+
+def _told_vaguely(case: Case, row: int) -> float | None:
+    """The standard deviation in m of a first pose that is as far off as it was told to be."""
+    t, sigma = case.error.t_ns, case.sigma_belief_m
+    near = (t >= t[row]) & (t <= t[row] + NS_PER_S) & np.isfinite(sigma)
+    if not near.any():
+        return None
+    told = float(sigma[near].max())
+    is_honest = case.error.distance_m[row] <= HONEST * told
+    return told if told >= VAGUE_M and is_honest else None
 
 
 def was_set(case: Case, onset: int) -> Answer | None:

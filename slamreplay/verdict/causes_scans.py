@@ -21,6 +21,8 @@ DELAY_S = 0.1
 ALIKE = 0.9
 #: A belief that was matched to a wrong place jumps there; one that only trusts itself slides.
 JUMP_M = 0.2
+#: Right after the jump is so long.
+SOON_NS = 5 * NS_PER_S
 #: A gap in the scans this shortly before the loss has to do with it.
 BLIND_NS = 3 * NS_PER_S
 #: A change this shortly before or after the loss has to do with it.
@@ -48,17 +50,22 @@ def late(case: Case, onset: int) -> Answer | None:
 
 def changed_map(case: Case, onset: int) -> Answer | None:
     """The map was no longer true where the belief left the truth."""
-    near = [
+    near = near_change(case, onset)
+    if not near:
+        return None
+    text = f"the belief left the truth at {case.seconds(onset)}, where the map was no longer true"
+    return "stale_map_use", 0.6, [text, *changed_words(near, case.hindsight, case.start_ns)]
+
+
+def near_change(case: Case, onset: int) -> list[Interval]:
+    """The intervals around a time in which the map was contradicted."""
+    return [
         i
         for i in case.intervals
         if i.is_changed
         and i.start_ns <= onset + CHANGED_AFTER_NS
         and i.end_ns >= onset - CHANGED_BEFORE_NS
     ]
-    if not near:
-        return None
-    text = f"the belief left the truth at {case.seconds(onset)}, where the map was no longer true"
-    return "stale_map_use", 0.6, [text, *changed_words(near, case.hindsight, case.start_ns)]
 
 
 def pulled(case: Case, lost: Interval, onset: int, least_m: float) -> Answer | None:
@@ -77,7 +84,9 @@ def pulled(case: Case, lost: Interval, onset: int, least_m: float) -> Answer | N
         "than odometry and hindsight"
     )
     inside = (error.t_ns >= lost.start_ns) & (error.t_ns < lost.end_ns) & error.off(case.limits)
-    if fits_at_belief(case.view, error, inside & error.known, ALIKE):
+    # A place that looks alike does so at once; later on the robot drives where it does not.
+    soon = inside & (error.t_ns <= int(error.t_ns[found.end]) + SOON_NS)
+    if any(fits_at_belief(case.view, error, r & error.known, ALIKE) for r in (inside, soon)):
         text = f"{moved}: its scans fit the map there as well as where it really was"
         return "sensing_ambiguity", 0.7, [text]
     return "association_error", 0.6, [f"{moved}: its scans were matched to the wrong place"]

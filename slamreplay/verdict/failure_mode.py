@@ -29,6 +29,7 @@ def failure_mode(case: Case) -> FailureMode:
         return _not_lost(case)
     onset = case.since_lost(worst)
     bold = bold_words(case.error, worst, case.sigma_belief_m, case.start_ns)
+    gross = case.wheels is not None and case.wheels.is_gross
     questions: tuple[Callable[[], Answer | None], ...] = (
         lambda: causes_pose.told_otherwise(case, worst),
         lambda: causes_pose.from_the_start(case, worst, onset),
@@ -37,6 +38,8 @@ def failure_mode(case: Case) -> FailureMode:
         lambda: causes_scans.blind(case, onset),
         lambda: causes_scans.late(case, onset),
         lambda: causes_scans.changed_map(case, onset),
+        lambda: causes_motion.unheard(case, onset),
+        lambda: causes_motion.uncalibrated(case, onset) if gross else None,
         lambda: causes_scans.pulled(case, worst, onset, causes_scans.JUMP_M if bold else 0.0),
         lambda: causes_motion.sure_of_itself(case, onset) if bold else None,
         lambda: causes_motion.uncalibrated(case, onset),

@@ -12,7 +12,7 @@ from slamreplay.verdict.apart import judged_apart
 from slamreplay.verdict.contract import contract_findings
 from slamreplay.verdict.findings import motion_findings, verdict_findings
 from slamreplay.verdict.intervals import log_confidence, log_state
-from slamreplay.verdict.judgement import Judgement
+from slamreplay.verdict.judgement import FailureMode, Judgement
 from slamreplay.verdict.lacking import lacking
 from slamreplay.verdict.limits import Limits
 from slamreplay.verdict.looked_at import looked_at
@@ -30,6 +30,7 @@ def judge(
     belief: PoseTrack | None,
     hindsight: Hindsight | None,
     limits: Limits = _DEFAULT,
+    began: FailureMode | None = None,
 ) -> Judgement:
     """Was it lost, or had the world changed?
 
@@ -42,15 +43,16 @@ def judge(
         belief: base in map at every scan as the robot believed it, None where no localizer spoke.
         hindsight: where it really was, None without a map or without scans.
         limits: thresholds.
+        began: how it began to fail, where that is known better than the evidence tells by itself.
     """
     if belief is not None and not belief.has_pose.any():
         belief = None
     if hindsight is None or not len(hindsight.track):
         return unjudged(view, belief, hindsight, limits)
     if hindsight.parts:
-        return judged_apart(view, belief, hindsight, limits)
+        return judged_apart(view, belief, hindsight, limits, began)
     looked = looked_at(view, belief, hindsight, limits)
-    evidence, mode, delay = looked.evidence, looked.mode, looked.delay
+    evidence, mode, delay = looked.evidence, began or looked.mode, looked.delay
     if evidence is None:
         fit, ambiguous = looked.fit, looked.fit is None
         return unjudged(view, belief, hindsight, limits, fit=fit, ambiguous=ambiguous)

@@ -18,7 +18,7 @@ SWING_RAD_S = 0.3
 #: Scans of a turn that the regression needs.
 LEAST_SCANS = 10
 #: Longer delays than this leave the turn that shows them.
-LONGEST_S = 0.7
+LONGEST_S = 1.5
 #: No turn tells a lag closer than this, however well its line fits.
 _FLOOR_S = 0.004
 #: Headings of odometry and map part by so much within a second, without any delay.

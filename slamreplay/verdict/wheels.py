@@ -108,6 +108,32 @@ class Wheels:
             for value, sigma in scales
         )
 
+    def mended(self, odometry: se2.Array) -> se2.Array:
+        """Odometry (N, 3) with its scales and its pull taken out where they are beyond noise.
+
+        What is left of a difference to where the robot was is an event. NaN rows stay.
+        """
+        out = np.full_like(odometry, np.nan)
+        rows = np.flatnonzero(np.isfinite(odometry).all(axis=1))
+        if not len(rows):
+            return out
+        way = 1.0 if self.scale is None else _sure((self.scale, self.scale_sigma or 0.0))
+        turn = 1.0 if self.turn_scale is None else _sure((self.turn_scale, self.turn_sigma or 0.0))
+        pull = self.pull_rad_m or 0.0
+        pull = pull if abs(pull) > PULL_WORTH_RAD_M else 0.0
+        told = odometry[rows]
+        steps = se2.between(told[:-1], told[1:])
+        steps[:, :2] /= way
+        steps[:, 2] = se2.wrap_angle(steps[:, 2]) / turn - pull * steps[:, 0]
+        yaw = told[0, 2] + np.concatenate([[0.0], np.cumsum(steps[:, 2])])
+        cos, sin = np.cos(yaw[:-1]), np.sin(yaw[:-1])
+        dx = cos * steps[:, 0] - sin * steps[:, 1]
+        dy = sin * steps[:, 0] + cos * steps[:, 1]
+        out[rows, 0] = told[0, 0] + np.concatenate([[0.0], np.cumsum(dx)])
+        out[rows, 1] = told[0, 1] + np.concatenate([[0.0], np.cumsum(dy)])
+        out[rows, 2] = se2.wrap_angle(yaw)
+        return out
+
     @property
     def calibration_words(self) -> tuple[str, ...]:
         """Systematic errors worth a word: four sigmas and more."""
