@@ -57,7 +57,7 @@ class Calibration:
 def key_of(tried: Tried) -> str:
     """What a trial is called in the calibration: the kind, and the perturbation if it has one."""
     trial = tried.trial
-    return f"{trial.kind} {trial.name}".strip()
+    return f"{trial.kind} {trial.name.partition('.')[0]}".strip()
 
 
 def shipped_calibration() -> Calibration:
