@@ -17,6 +17,7 @@ from PIL import Image
 from slamreplay.errors import UsageError
 from slamreplay.labs import LABS
 from slamreplay.recipes import read_recipe
+from slamreplay.recipes.lab_recipe import LabRecipe
 
 ROOT = Path(__file__).resolve().parents[1]
 RECIPES = sorted(path for path in (ROOT / "recipes").iterdir() if path.is_dir())
@@ -128,8 +129,19 @@ def is_smaller(golden, full):
 def test_a_golden_recipe_asks_the_same(recipe):
     full, golden = (read_recipe(path) for path in (recipe / "recipe.yaml", replayed(recipe)))
 
-    assert (full.question, full.lab, full.seed) == (golden.question, golden.lab, golden.seed)
-    assert is_smaller(golden.parameters.model_dump(), full.parameters.model_dump())
+    assert full.question == golden.question
+    if isinstance(full, LabRecipe):
+        assert (full.lab, full.seed) == (golden.lab, golden.seed)
+        assert is_smaller(golden.parameters.model_dump(), full.parameters.model_dump())
+        return
+    plan, part = full.plan, golden.plan
+    assert full.scenario == golden.scenario
+    assert (part.limits, part.positive_control) == (plan.limits, plan.positive_control)
+    assert set(part.seeds) <= set(plan.seeds)
+    assert set(part.estimators) <= set(plan.estimators)
+    for axis in part.axes:
+        (same,) = [a for a in plan.axes if (a.perturbation, a.side) == (axis.perturbation, axis.side)]
+        assert set(axis.levels) <= set(same.levels)
 
 
 @pytest.mark.parametrize("recipe", RECIPES, ids=lambda path: path.name)
@@ -142,6 +154,26 @@ def test_page_and_figures_are_there(recipe, answered):
     assert {name.replace(".png", ".svg") for name in figures} <= names
     page = (answered / recipe.name / "results.md").read_text(encoding="utf-8")
     assert all(f"({name})" in page for name in figures)
+
+
+def test_margins_are_checked_by_their_script(answered, tmp_path):
+    folder = ROOT / "recipes" / "ci-gate"
+    results = answered / folder.name / "results.json"
+    curves = json.loads(results.read_text(encoding="utf-8"))["results"]["curves"]
+    demanded = json.loads((folder / "margins.json").read_text(encoding="utf-8"))
+    held = {p: {e: demanded[p][e] for e in by_estimator} for p, by_estimator in curves.items()}
+    margins = tmp_path / "margins.json"
+
+    def checked():
+        command = [sys.executable, folder / "check.py", results, margins]
+        return subprocess.run(command, capture_output=True, text=True)
+
+    margins.write_text(json.dumps(held), encoding="utf-8")
+    assert (checked().returncode, checked().stdout) == (0, "every margin holds\n")
+    margins.write_text(json.dumps({"initial_pose.offset": {"amcl": 4.0}}), encoding="utf-8")
+    assert checked().returncode == 1
+    margins.write_text(json.dumps({"scan_delay.stamp": {"amcl": 0.1}}), encoding="utf-8")
+    assert "not tried" in checked().stdout
 
 
 SMALL = BREATHING.read_text(encoding="utf-8").replace("runs: 1000", "runs: 30")
