@@ -116,16 +116,9 @@ def perturb(
         end_s=end_s,
     )
     if recipe is not None:
-        from slamreplay.cli.lab import run_lab
-        from slamreplay.recipes import BudgetRecipe, LabRecipe, read_recipe
+        from slamreplay.cli.recipe import Given, run_recipe
 
-        asked = read_recipe(recipe)
-        of_runs: dict[str, object] = {
-            "--perturbation": perturbations,
-            "--estimator": estimators,
-            "--parameters": parameters,
-        }
-        of_logs: dict[str, object] = {
+        ingested = {
             "--map": map_yaml,
             "--topics": topics,
             "--robot": robot,
@@ -133,36 +126,17 @@ def perturb(
             "--start": start_s,
             "--end": end_s,
         }
-        is_lab = isinstance(asked, LabRecipe)
-        foreign = {"LOG": logs, **of_runs, **of_logs} if is_lab else of_runs
-        names = [name for name, value in foreign.items() if value not in (None, [])]
-        if isinstance(asked, LabRecipe):
-            run_lab(asked, recipe, output, seed=seed, given=names, as_json=as_json)
-            return
-        if isinstance(asked, BudgetRecipe):
-            from slamreplay.cli.budget import run_budget
-
-            run_budget(
-                asked, recipe, logs or (), how, output, seed=seed, given=names, as_json=as_json
-            )
-            return
-        from slamreplay.cli.dose import run_design
-
-        if perturbations:
-            raise UsageError("the recipe says what is perturbed: it takes no --perturbation",
-                             where=recipe, hint="leave it out")  # fmt: skip
-        run_design(
-            asked,
-            recipe,
-            output,
-            logs=logs or (),
-            how=how,
-            estimators=estimators or (),
-            parameters=parameters or (),
-            robot=robot,
-            seed=seed,
-            as_json=as_json,
+        asked = Given(
+            logs or (),
+            how,
+            perturbations or (),
+            estimators or (),
+            parameters or (),
+            robot,
+            seed,
+            [name for name, value in ingested.items() if value is not None],
         )
+        run_recipe(recipe, output, asked, as_json=as_json)
         return
     if not logs:
         raise UsageError("there is no LOG to replay", hint="name one, or a lab with --recipe")
