@@ -100,6 +100,31 @@ def test_however_a_log_tells_odometry_it_is_changed_alike(text, level, shape):
     assert np.abs(other - path(BUNDLE.view()))[:, :2].max() > 0.05
 
 
+def tilted(view):
+    """The same way on a slope: with height, roll and pitch."""
+    table = view.table("transforms")
+    own = table["child_frame"] == "base_link"
+    count = int(own.sum())
+    rng = np.random.default_rng(3)
+    xyz, turn = table["translation_xyz"].copy(), table["rotation_xyzw"].copy()
+    yaw = se3.yaw_from_quaternion(turn[own])
+    xyz[own, 2] = rng.normal(0.0, 0.3, count)
+    turn[own] = se3.quaternion_from_rpy(*rng.normal(0.0, 0.1, (2, count)), yaw)
+    return view.with_table(table.replace(translation_xyz=xyz, rotation_xyzw=turn))
+
+
+@pytest.mark.parametrize("shape", ["tf", "upside down"])
+def test_height_roll_and_pitch_stay(shape):
+    view = SHAPES[shape](tilted(BUNDLE.view()))
+    at = np.arange(START_NS + 10**9, START_NS + 15 * 10**9, 10**8)
+
+    after = perturbed("odometry_scale.rotation", 0.7, view)
+
+    before, T = (v.transforms.lookup("odom", "base_link", at)[0] for v in (view, after))
+    np.testing.assert_allclose(T[:, 2, 3], before[:, 2, 3], atol=1e-6)
+    np.testing.assert_allclose(T[:, 2, :3], before[:, 2, :3], atol=1e-6)  # where up is in the base
+
+
 @pytest.mark.parametrize(("text", "level"), CHANGED)
 def test_tf_and_topic_tell_the_same_although_their_rows_come_at_other_times(text, level):
     table = BUNDLE.table("odometry")
