@@ -224,6 +224,10 @@ def test_a_baseline_beyond_its_limit_is_told_and_shows_nothing(bundle):
 
     critical = only(found).critical[0]
     assert (critical.outcome, critical.level) == ("always", 0.0)
+    assert only(found).broke_first is None  # no dose is to blame
+    assert "beyond its limit undisturbed" in only(found).notes[0]
+    assert ranking(found.results)[0].undisturbed == ("error_max_m",)
+    assert critical_rows(found.results)[1][4] == "nothing more"
     (positive,) = [c for c in found.results.controls if c.kind == "positive"]
     assert positive.passed is False
     assert "undisturbed" in positive.text

@@ -22,9 +22,15 @@ def critical_rows(results: DoseResults) -> Rows:
             continue
         rows.append(
             [panel_of(curve), curve.unit, curve.estimator, level_text(curve.critical[0]),
-             curve.broke_first or "nothing", _controls_of(curve, results.controls)]
+             broke_text(curve), _controls_of(curve, results.controls)]
         )  # fmt: skip
     return rows
+
+
+def broke_text(curve: DoseCurve) -> str:
+    """What broke first; "nothing more" where limits are crossed undisturbed and no other later."""
+    already = any(critical.outcome == "always" for critical in curve.critical)
+    return curve.broke_first or ("nothing more" if already else "nothing")
 
 
 def level_text(critical: Critical) -> str:
@@ -57,14 +63,16 @@ def ranking_rows(results: DoseResults) -> Rows:
     """The least margin first."""
     rows = [["estimator", "perturbation", "broke first", "at", "share of the range"]]
     return rows + [
-        [m.estimator, m.perturbation, m.metric or "nothing", *_margin_cells(m)]
+        [m.estimator, m.perturbation, m.metric or ("nothing more" if m.undisturbed else "nothing"),
+         *_margin_cells(m)]
         for m in ranking(results)
-    ]
+    ]  # fmt: skip
 
 
 def _margin_cells(margin: Margin) -> tuple[str, str]:
     if margin.level is None or margin.share is None:
-        return "-", "held to its end"
+        already = ", ".join(margin.undisturbed)
+        return "-", f"beyond it undisturbed: {already}" if already else "held to its end"
     return f"{margin.level:g} {margin.unit}", f"{margin.share:.0%}"
 
 
