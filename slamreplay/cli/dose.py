@@ -161,7 +161,9 @@ def _told(results: DoseResults, log: Mapping[str, Any], trials: int) -> str:
     lines = [results.question, "", *failed, *([""] if failed else [])]
     lines += [f"critical level: {results.limits[0].title}", _text(critical_rows(results)), ""]
     lines += ["what breaks first:", _text(ranking_rows(results)), ""]
-    lines += [f"({of}{trials} trials, seeds {results.seeds[0]} to {results.seeds[-1]})"]
+    first, *others = results.seeds
+    seeds = f"seeds {first} to {others[-1]}" if others else f"seed {first}"
+    lines += [f"({of}{trials} trials, {seeds})"]
     lines += [f"note: {note}" for note in notes(results) if note not in failed]
     return "\n".join(lines)
 
