@@ -358,3 +358,12 @@ def test_a_damaged_answer_is_refused_in_one_line(tmp_path):
     (tmp_path / "doses.json").write_text('{"doses_format": 99}')
     with pytest.raises(BundleError, match="doses format 99"):
         read_doses(tmp_path)
+
+
+def test_scans_that_are_missing_are_moments_that_count(bundle):
+    """At its rows this estimator is right; between them odometry drifts."""
+    curve = only(answer(bundle, plan(of_levels("scan_drop.even", [0.95]))))
+
+    undisturbed, dropped = (r.values["error_max_m"][0] for r in curve.responses)
+    assert dropped > undisturbed + 0.001
+    assert curve.responses[1].values["unposed_share"] == pytest.approx((0.0,), abs=0.35)

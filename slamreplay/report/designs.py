@@ -5,10 +5,10 @@ from __future__ import annotations
 from slamreplay.replay.dose import Critical, DoseCurve, DoseResults
 from slamreplay.replay.dose_ranking import Margin, ranking
 from slamreplay.report.dose_tables import (
+    broke_text,
     control_rows,
     level_text,
     notes,
-    nothing,
     panel_of,
     ranking_rows,
     words_of,
@@ -56,7 +56,7 @@ def design_table(results: DoseResults | None) -> Table:
                 _value(first.values.get(metric)),
                 Cell(_value(last.values.get(metric)), f"at {last.level:g} {curve.unit}"),
                 Cell(_took(curve), _interval(curve.critical[0])),
-                curve.broke_first or nothing(curve),
+                broke_text(curve),
             ]
         )
     return table(head, rows, "doses.json of the runs")

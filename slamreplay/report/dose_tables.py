@@ -22,14 +22,15 @@ def critical_rows(results: DoseResults) -> Rows:
             continue
         rows.append(
             [panel_of(curve), curve.unit, curve.estimator, level_text(curve.critical[0]),
-             curve.broke_first or nothing(curve), _controls_of(curve, results.controls)]
+             broke_text(curve), _controls_of(curve, results.controls)]
         )  # fmt: skip
     return rows
 
 
-def nothing(curve: DoseCurve) -> str:
-    """What is said where no dose crossed a limit."""
-    return "nothing more" if any(c.outcome == "always" for c in curve.critical) else "nothing"
+def broke_text(curve: DoseCurve) -> str:
+    """What broke first; "nothing more" where limits are crossed undisturbed and no other later."""
+    already = any(critical.outcome == "always" for critical in curve.critical)
+    return curve.broke_first or ("nothing more" if already else "nothing")
 
 
 def level_text(critical: Critical) -> str:
