@@ -79,7 +79,8 @@ def run_design(
         log: dict[str, Any] = {"bundle_id": bundle.manifest.bundle_id, "scenario": None}
         if not logs and recipe.scenario is not None:
             log["scenario"] = dict(zip(("name", "seed"), recipe.scenario, strict=True))
-        write_answer(output, bundle, plan, found, log, keep_bundle=not is_kept)
+        write_answer(output, bundle, plan, found, log, keep_bundle=not is_kept,
+                     cache=cache_folder())  # fmt: skip
     if as_json:
         typer.echo(results_json(plan, found.results, log), nl=False)
         return
