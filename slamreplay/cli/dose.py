@@ -77,10 +77,9 @@ def run_design(
         log: dict[str, Any] = {"bundle_id": bundle.manifest.bundle_id, "scenario": None}
         if not logs and recipe.scenario is not None:
             log["scenario"] = dict(zip(("name", "seed"), recipe.scenario, strict=True))
-        is_given = (
-            bool(logs) and bundle.path is not None and bundle.path.resolve() == logs[0].resolve()
-        )
-        write_answer(output, bundle, plan, found, log, keep_bundle=not is_given)
+        own = bundle.path.resolve() if logs and bundle.path is not None else None
+        keep = own is None or own != logs[0].resolve()
+        write_answer(output, bundle, plan, found, log, keep_bundle=keep, cache=cache_folder())
     if as_json:
         typer.echo(results_json(plan, found.results, log), nl=False)
         return

@@ -140,7 +140,7 @@ def check_estimators(names: list[str]) -> None:
         UsageError: an unknown name, or one given twice.
     """
     for name in names:
-        ESTIMATORS.load(name)
+        ESTIMATORS.target(name)
     if len(set(names)) != len(names):
         raise UsageError("an estimator is named twice")
 
