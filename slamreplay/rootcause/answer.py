@@ -101,10 +101,19 @@ def _told(looked: Looked, weights: Calibration) -> RootCause | None:
     probability = weights.unplayed.get(mode.kind, mode.confidence)
     if probability is None:
         return None
-    only = Candidate(mode.kind, None, None, "", None, 0.0, probability, text)
+    name, level, unit = _dose(looked)
+    only = Candidate(mode.kind, name, level, unit, None, 0.0, probability, text)
     reason = "" if case is not None else looked.reason
     start, end = bad[0].start_ns, bad[-1].end_ns
     return RootCause(start, end, mode.kind, probability, (only,), 0, reason)
+
+
+def _dose(looked: Looked) -> tuple[str | None, float | None, str]:
+    """Perturbation, level and unit of what harmed the map alone."""
+    case, kind = looked.case, looked.mode.kind
+    if case is None or kind != "stale_map_use":
+        return None, None, ""
+    return "map_stale.versions", 1.0, "ratio"
 
 
 def _answer(

@@ -13,7 +13,6 @@ import numpy as np
 from slamreplay.rootcause.trying import Tried
 from slamreplay.verdict.judgement import FailureKind
 
-
 #: Probability that what happened is none of what was tried, shared evenly: simulations cannot tell
 #: 0.99 from 0.999, and real logs fail in ways that none shows.
 UNFORESEEN = 0.02
@@ -58,7 +57,7 @@ class Calibration:
 def key_of(tried: Tried) -> str:
     """What a trial is called in the calibration: the kind, and the perturbation if it has one."""
     trial = tried.trial
-    return f"{trial.kind} {trial.name}".strip()
+    return f"{trial.kind} {trial.name.partition('.')[0]}".strip()
 
 
 def shipped_calibration() -> Calibration:

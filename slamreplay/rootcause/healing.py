@@ -11,6 +11,7 @@ from slamreplay.bundle.scans import scan_set
 from slamreplay.estimators.amcl.config import AmclConfig
 from slamreplay.geometry import se2
 from slamreplay.maps.grid import FREE, OCCUPIED, OccupancyGrid
+from slamreplay.maps.likelihood_field import distance_field
 from slamreplay.rootcause.beams import Rows, beams_of, cleared
 from slamreplay.rootcause.doses import Slip, calibrated, healed_steps, slips_of
 from slamreplay.rootcause.first_pose import right_start
@@ -75,7 +76,9 @@ def healed(incident: Incident, config: AmclConfig) -> Healed | None:
     came = beams_of(incident, scans, config, new, truth)
     clear, share = cleared(came, new, truth)
     path = put_together(truth[0], steps)
-    evidence = Evidence(path, clear, new, *right_start(incident, truth), config)
+    start = right_start(incident, truth)
+    far = distance_field(new, config.laser_likelihood_max_dist)
+    evidence = Evidence(path, clear, new, *start, config, far)
     return Healed(evidence, truth, told, steps, slips, came, share, old)
 
 

@@ -38,7 +38,7 @@ def trusts(incident: Incident, healed: Healed) -> Iterator[Trial]:
         told = replace(healed.evidence, config=sure, odometry=odometry)
         words = f"a filter that takes {ratio:g} of the process noise, with {_FEW} particles"
         yield Trial(
-            "process_noise_scale.ratio", "overconfidence", ratio, "ratio", None, words, told
+            "process_noise_scale.covariance", "overconfidence", ratio, "ratio", None, words, told
         )
 
 

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from slamreplay.geometry import se2
+from slamreplay.rootcause.doses import Slip
 from slamreplay.rootcause.first_pose import START_COV, WIDE_M, first_told, wider
 from slamreplay.rootcause.healing import Healed
 from slamreplay.rootcause.incident import Incident
@@ -36,7 +37,7 @@ def starts(incident: Incident, healed: Healed) -> Iterator[Trial]:
     wrong, vague = (odds - max(above, 0.0) for odds in (wrong, vague))
     if wide > WIDE_M:
         words = f"the first pose, told to within {wide:.1f} m and {apart(metres, turn)} off"
-        yield Trial("", "sensing_ambiguity", wide, "m", 0, words, evidence,
+        yield Trial("initial_pose.ambiguous", "sensing_ambiguity", wide, "m", 0, words, evidence,
                     log_dose=max(vague, -_MOST), seeds=SEEDS)  # fmt: skip
     words = f"the first pose as it was told, {apart(metres, turn)} off"
     yield Trial("initial_pose.offset", "wrong_initial_pose", metres, "m", 0, words, evidence,
@@ -83,6 +84,14 @@ def _slipped(incident: Incident, healed: Healed) -> Iterator[Trial]:
     words = f"odometry as recorded from {since} on, {far} otherwise than the robot moved"
     told = replace(healed.evidence, odometry=healed.odometry_of(steps))
     odds, row = worst.log_carried, worst.first
-    name = "odometry_slip.window"
-    yield Trial(name, "odometry_slip", worst.metres, "m", row, words, told, log_dose=-odds)
-    yield Trial(name, "kidnapped", worst.metres, "m", row, words, told, log_dose=odds)
+    name, level, unit = _dose(worst)
+    yield Trial(name, "odometry_slip", level, unit, row, words, told, log_dose=-odds)
+    yield Trial(name, "kidnapped", level, unit, row, words, told, log_dose=odds)
+
+
+def _dose(slip: Slip) -> tuple[str, float, str]:
+    """What it is as a perturbation: way or turn that was told and not made, its size and unit."""
+    told_m = slip.counted_m - slip.moved_m
+    if abs(slip.radians) > np.radians(20.0) and abs(told_m) < 0.5:
+        return "odometry_slip.turn", float(-np.degrees(slip.radians)), "deg"
+    return "odometry_slip.window", float(told_m), "m"

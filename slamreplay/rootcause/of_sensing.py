@@ -9,6 +9,7 @@ import numpy as np
 
 from slamreplay.geometry import se2
 from slamreplay.geometry.times import NS_PER_S, ns
+from slamreplay.maps.likelihood_field import distance_field
 from slamreplay.rootcause.healing import Healed
 from slamreplay.rootcause.incident import Incident
 from slamreplay.rootcause.trial import Trial
@@ -65,7 +66,7 @@ def people(incident: Incident, healed: Healed) -> Iterator[Trial]:
     told = replace(healed.evidence, beams=healed.told_beams)
     # What stands where the map has nothing cuts beams, too.
     odds = -_CHANGED if near_change(incident.case, incident.onset_ns) else 0.0
-    name, row = "people.crowd", int(rows[0])
+    name, row = "people.hidden", int(rows[0])
     yield Trial(name, "association_error", share, "ratio", row, words, told, log_dose=odds)
 
 
@@ -77,11 +78,13 @@ def maps(incident: Incident, healed: Healed, offset: ConstantOffset | None) -> I
         area = sum(r.area_m2 for r in changes.regions)
         words = f"the map as the robot had it, {area:.1f} m² of which is no longer true"
         odds = _CHANGED if near_change(incident.case, incident.onset_ns) else -1.0
-        told = replace(e, grid=old)
-        name = "map_stale.version"
-        yield Trial(name, "stale_map_use", area, "m2", None, words, told, log_dose=odds)
+        far = distance_field(old, e.config.laser_likelihood_max_dist)
+        told = replace(e, grid=old, distance_m=far)
+        name = "map_stale.versions"
+        yield Trial(name, "stale_map_use", 1.0, "ratio", None, words, told, log_dose=odds)
     if offset is not None and offset.cause == "map":
         words = f"a map that lies elsewhere ({offset.text})"
         said = se2.compose(np.array(offset.xyyaw), healed.truth)
-        size = offset.at_robot_m
-        yield Trial("map_shift.offset", "wrong_map", size, "m", None, words, belief=said)
+        x, y, _ = offset.xyyaw
+        name, size = ("map_shift.x", x) if abs(x) >= abs(y) else ("map_shift.y", y)
+        yield Trial(name, "wrong_map", size, "m", None, words, belief=said)

@@ -25,6 +25,7 @@ class Evidence:
         start: (3,) pose it begins with, in the map.
         cov: (3, 3) of it.
         config: its parameters.
+        distance_m: (H, W) of that map, from each cell to the nearest wall.
         set_again: poses and covariances it is set to later, by row.
     """
 
@@ -34,6 +35,7 @@ class Evidence:
     start: se2.Array
     cov: se2.Array
     config: AmclConfig
+    distance_m: NDArray[np.float32]
     set_again: tuple[tuple[int, se2.Array, se2.Array], ...] = ()
 
 
@@ -57,7 +59,7 @@ class Replay:
 def replayed(evidence: Evidence, seed: int) -> Replay:
     """Run the filter over the rows once; the same seed gives the same bits."""
     e = evidence
-    amcl = AmclFilter(e.config, e.grid, seed)
+    amcl = AmclFilter(e.config, e.grid, seed, e.distance_m)
     n = len(e.odometry)
     xyyaw, sigma = np.empty((n, 3)), np.empty(n)
     scans = np.array([b is not None for b in e.beams])
