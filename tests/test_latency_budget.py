@@ -249,7 +249,10 @@ def test_a_log_takes_the_scenarios_place_and_the_same_gives_the_same_bytes(tmp_p
     assert said[: len(said) // 2] == said[len(said) // 2 :]
     told = json.loads(said[: len(said) // 2])
     assert (told["log"], told["scenario"]) == (["healthy_short.bag"], None)
-    assert told["results"]["consumers"][0]["topic"] == "/cmd_vel"
+    assert [(c["name"], c["topic"]) for c in told["results"]["consumers"]] == [
+        ("controller", "/cmd_vel"), ("planner", "/plan"), ("goals", "/behavior_tree_log"),
+        ("controller", None), ("planner", None),
+    ]  # fmt: skip
     names = sorted(p.name for p in (tmp_path / "a").iterdir())
     assert names == ["latency_budget.png", "latency_budget.svg", "results.json", "results.md"]
     for name in names:

@@ -15,11 +15,11 @@ from slamreplay.errors import UsageError
 
 if TYPE_CHECKING:
     from slamreplay.bundle.view import Bundle
-    from slamreplay.doses.page import Rows
     from slamreplay.doses.plan import Plan
     from slamreplay.ingest.options import IngestOptions
     from slamreplay.recipes import DoseRecipe
     from slamreplay.replay.dose import DoseResults
+    from slamreplay.report.dose_tables import Rows
 
 
 def run_design(
@@ -153,7 +153,7 @@ def _simulated(scenario: tuple[str, int], target: Path) -> Bundle:
 
 def _told(results: DoseResults, log: Mapping[str, Any], trials: int) -> str:
     """Question, table, what broke first, and every failed control."""
-    from slamreplay.doses.page import critical_rows, notes, ranking_rows, warning
+    from slamreplay.report.dose_tables import critical_rows, notes, ranking_rows, warning
 
     failed = [warning(c) for c in results.controls if c.passed is False]
     scenario = log["scenario"]
@@ -161,7 +161,9 @@ def _told(results: DoseResults, log: Mapping[str, Any], trials: int) -> str:
     lines = [results.question, "", *failed, *([""] if failed else [])]
     lines += [f"critical level: {results.limits[0].title}", _text(critical_rows(results)), ""]
     lines += ["what breaks first:", _text(ranking_rows(results)), ""]
-    lines += [f"({of}{trials} trials, seeds {results.seeds[0]} to {results.seeds[-1]})"]
+    first, *others = results.seeds
+    seeds = f"seeds {first} to {others[-1]}" if others else f"seed {first}"
+    lines += [f"({of}{trials} trials, {seeds})"]
     lines += [f"note: {note}" for note in notes(results) if note not in failed]
     return "\n".join(lines)
 

@@ -8,10 +8,11 @@ from typing import Any
 
 from slamreplay.bundle.view import Bundle
 from slamreplay.doses.answer import Answer
-from slamreplay.doses.page import PAGE, RESULTS, results_json, results_page, words_of
+from slamreplay.doses.page import PAGE, RESULTS, results_json, results_page
 from slamreplay.doses.plan import Plan
 from slamreplay.replay.dose_file import DOSES, doses_json
 from slamreplay.replay.folder import write_runs
+from slamreplay.report.dose_tables import words_of
 
 FIGURE = "doses"
 
