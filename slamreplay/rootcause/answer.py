@@ -64,15 +64,33 @@ def _of(
 ) -> RootCause | None:
     """Of a log, or of a stretch of it with one map."""
     looked = looked_at(view, belief, hindsight, limits)
-    incident = None if belief is None else _incident(looked, belief, hindsight, limits)
-    if incident is None:
-        return _told(looked, weights)
-    put_right = healed(incident, AmclConfig())
-    if put_right is None:
-        return _told(looked, weights)
-    tried = tried_of(incident, put_right, looked)
+    found = _tried(looked, belief, hindsight, limits)
+    if found is None:
+        return _told(looked)
+    incident, put_right, tried = found
     chance = weights.probabilities(tried, looked.mode.kind)
     return _answer(incident, put_right, tried, chance)
+
+
+def trials_and_mode(
+    view: BundleView, belief: PoseTrack | None, hindsight: Hindsight | None
+) -> tuple[list[Tried], FailureKind] | None:
+    """What a calibration is fitted to: the trials, and what the verdict says without them."""
+    if hindsight is None or not len(hindsight.track) or hindsight.parts:
+        return None
+    looked = looked_at(view, belief, hindsight, Limits())
+    found = _tried(looked, belief, hindsight, Limits())
+    return None if found is None else (found[2], looked.mode.kind)
+
+
+def _tried(
+    looked: Looked, belief: PoseTrack | None, hindsight: Hindsight, limits: Limits
+) -> tuple[Incident, Healed, list[Tried]] | None:
+    incident = None if belief is None else _incident(looked, belief, hindsight, limits)
+    put_right = None if incident is None else healed(incident, AmclConfig())
+    if incident is None or put_right is None:
+        return None
+    return incident, put_right, tried_of(incident, put_right, looked)
 
 
 def _incident(
@@ -90,7 +108,7 @@ def _incident(
     return incident_of(case, belief, limits)
 
 
-def _told(looked: Looked, weights: Calibration) -> RootCause | None:
+def _told(looked: Looked) -> RootCause | None:
     """What the verdict says of a failure that no replay of a filter can show."""
     mode, case = looked.mode, looked.case
     failed = case is None or any(i.is_lost or i.is_changed for i in looked.intervals)
@@ -98,9 +116,7 @@ def _told(looked: Looked, weights: Calibration) -> RootCause | None:
         return None
     bad = [i for i in looked.intervals if i.is_lost or i.is_changed] or list(looked.intervals)
     text = "; ".join(mode.evidence)
-    probability = weights.unplayed.get(mode.kind, mode.confidence)
-    if probability is None:
-        return None
+    probability = 1.0 if mode.confidence is None else mode.confidence
     name, level, unit = _dose(looked)
     only = Candidate(mode.kind, name, level, unit, None, 0.0, probability, text)
     reason = "" if case is not None else looked.reason

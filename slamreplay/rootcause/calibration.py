@@ -26,13 +26,11 @@ class Calibration:
         slope: of the log likelihood: one over the temperature.
         bias: what is added to a trial's score, by `key_of`; nats.
         rule: what is added where the verdict's own failure mode is of the trial's kind; nats.
-        unplayed: probability of a failure mode that no replay was asked about, by kind.
     """
 
     slope: float = 0.5
     bias: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
     rule: float = 0.0
-    unplayed: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
 
     def probabilities(self, tried: Sequence[Tried], rule: FailureKind) -> list[float]:
         """Of each trial; they sum to 1.
@@ -41,12 +39,17 @@ class Calibration:
             tried: with their likelihoods.
             rule: the verdict's failure mode, which no replay was asked for.
         """
+        trials = [(key_of(t), t.trial.kind, t.log_likelihood) for t in tried]
+        return self.shares(trials, rule)
+
+    def shares(
+        self, trials: Sequence[tuple[str, FailureKind, float]], rule: FailureKind
+    ) -> list[float]:
+        """The same of trials told by key, kind and log likelihood."""
         scores = np.array(
             [
-                self.slope * t.log_likelihood
-                + self.bias.get(key_of(t), 0.0)
-                + (self.rule if t.trial.kind == rule else 0.0)
-                for t in tried
+                self.slope * value + self.bias.get(key, 0.0) + (self.rule if kind == rule else 0.0)
+                for key, kind, value in trials
             ]
         )
         chance = np.exp(scores - scores.max())
@@ -66,4 +69,4 @@ def shipped_calibration() -> Calibration:
     if not file.is_file():
         return Calibration()
     record = json.loads(file.read_text("utf-8"))
-    return Calibration(record["slope"], record["bias"], record["rule"], record["unplayed"])
+    return Calibration(record["slope"], record["bias"], record["rule"])

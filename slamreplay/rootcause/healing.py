@@ -72,7 +72,8 @@ def healed(incident: Incident, config: AmclConfig) -> Healed | None:
     told = healed_steps(steps_of(incident.odometry), (), truth)
     seen = np.concatenate([truth, incident.belief])
     old = cropped(grid, seen)
-    new = cropped(corrected(grid, incident.case.hindsight.changes), seen)
+    changes = incident.case.hindsight.changes if _changed(incident) else None
+    new = old if changes is None else cropped(corrected(grid, changes), seen)
     came = beams_of(incident, scans, config, new, truth)
     clear, share = cleared(came, new, truth)
     path = put_together(truth[0], steps)
@@ -80,6 +81,16 @@ def healed(incident: Incident, config: AmclConfig) -> Healed | None:
     far = distance_field(new, config.laser_likelihood_max_dist)
     evidence = Evidence(path, clear, new, *start, config, far)
     return Healed(evidence, truth, told, steps, slips, came, share, old)
+
+
+def _changed(incident: Incident) -> bool:
+    """Whether the verdict holds the map for changed anywhere in the stretch.
+
+    Less than that may be people who walked along, drawn into the corrected map.
+    """
+    low, high = int(incident.t_ns[0]), int(incident.t_ns[-1])
+    intervals = incident.case.intervals
+    return any(i.is_changed and i.start_ns <= high and i.end_ns >= low for i in intervals)
 
 
 def cropped(grid: OccupancyGrid, poses: se2.Array) -> OccupancyGrid:
