@@ -48,14 +48,32 @@ def held(
         return (Stretch(UNKNOWN, start_ns, end_ns),)
     usual = int(np.median(np.diff(t_ns))) if len(t_ns) > 1 else 0
     reach = max(bridge_ns, HOLD_SPACINGS * usual)
-    edges = [*t_ns.tolist(), max(end_ns, int(t_ns[-1]))]
-    parts = [Stretch(UNKNOWN, min(start_ns, edges[0]), edges[0])]
-    if edges[0] - start_ns <= reach:
-        parts = [Stretch(int(flags[0]), min(start_ns, edges[0]), edges[0])]
-    for flag, (now, after) in zip(flags.tolist(), pairwise(edges), strict=True):
-        until = after if after - now <= reach else now + (usual or reach)
-        parts += [Stretch(flag, now, until), Stretch(UNKNOWN, until, after)]
-    return merged(Stretch(p.value, max(p.start_ns, start_ns), min(p.end_ns, end_ns)) for p in parts)
+    after = np.append(t_ns[1:], max(end_ns, int(t_ns[-1])))
+    until = np.where(after - t_ns <= reach, after, t_ns + (usual or reach))
+    first = int(flags[0]) if int(t_ns[0]) - start_ns <= reach else UNKNOWN
+    # Each sample is followed by what nothing is known of, mostly of no length.
+    pairs = np.stack([flags, np.full(len(flags), UNKNOWN)], axis=1).ravel()
+    value = np.append(first, pairs)
+    edges = np.append(min(start_ns, int(t_ns[0])), np.stack([t_ns, until], axis=1).ravel())
+    return _joined(
+        value,
+        np.maximum(edges, start_ns),
+        np.minimum(np.append(edges[1:], after[-1]), end_ns),
+    )
+
+
+def _joined(
+    value: NDArray[np.int64], start_ns: NDArray[np.int64], end_ns: NDArray[np.int64]
+) -> Timeline:
+    """As `merged`, of stretches as arrays (N,)."""
+    there = end_ns > start_ns
+    value, start_ns, end_ns = value[there], start_ns[there], end_ns[there]
+    begins = np.flatnonzero(np.append(True, value[1:] != value[:-1])[: len(value)])
+    ends = np.append(begins[1:], len(value)) - 1
+    return tuple(
+        Stretch(int(value[a]), int(start_ns[a]), int(end_ns[b]))
+        for a, b in zip(begins, ends[: len(begins)], strict=True)
+    )
 
 
 def settled(timeline: Timeline, min_ns: int, bridge_ns: int) -> Timeline:
