@@ -24,6 +24,7 @@ from slamreplay.estimators.pose_graph.estimator import PoseGraph
 from slamreplay.estimators.pose_graph.product import MapAndGraph, map_and_graph
 from slamreplay.estimators.recorded import recorded_names
 from slamreplay.hindsight.pipeline import hindsight
+from slamreplay.replay.dose import DoseResults
 from slamreplay.replay.metrics import trial_metrics
 from slamreplay.replay.parameters import configured
 from slamreplay.report.evidence import Postmortem, TrialResult
@@ -49,6 +50,7 @@ def postmortem(
     hold_out: Collection[str] = (),
     correct_map: bool = False,
     trace_ns: int | None = None,
+    design: DoseResults | None = None,
     cause: bool = True,
     progress: Callable[[str, float], None] | None = None,
 ) -> Postmortem:
@@ -64,6 +66,7 @@ def postmortem(
         hold_out: kinds of sensed references (fiducial, dock, gnss) that judge hindsight instead of
             joining it.
         correct_map: propose a corrected map, too.
+        design: what the runs were laid out by, where it was a recipe.
         trace_ns: a moment around which to tell which measurements moved the belief.
         cause: replay what went wrong with one thing put right at a time.
         progress: told what is being done, and the share done from 0 to 1.
@@ -144,6 +147,7 @@ def postmortem(
         nees=nees_of_belief(context),
         consistency=consistency_summaries(context, answers),
         trials=trials,
+        design=design,
         recorded=recorded,
         jumps=tuple((asked_run.trial, jumps_of(asked)) for asked_run, asked in everybody),
         trace_ns=trace_ns,

@@ -238,7 +238,7 @@ class Deaf:
     name: ClassVar[str] = "deaf"
 
     def run(self, view: BundleView, *, seed: int) -> Estimate:
-        return DeadReckoning().run(view, seed=seed)
+        return DeadReckoning().run(replace(view, settings={}), seed=seed)
 
 
 def test_a_covariance_must_follow_the_noise():

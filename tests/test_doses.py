@@ -13,7 +13,7 @@ from slamreplay.doses.answer import answer
 from slamreplay.doses.carried import carried
 from slamreplay.doses.folder import write_answer
 from slamreplay.doses.metrics import METRICS, limit_of
-from slamreplay.doses.page import critical_rows, notes, results_page
+from slamreplay.doses.page import results_page
 from slamreplay.doses.plan import Dose, Plan, of_levels, of_search
 from slamreplay.errors import BundleError
 from slamreplay.estimators import ESTIMATORS
@@ -22,6 +22,7 @@ from slamreplay.replay import runner
 from slamreplay.replay.dose_file import read_doses
 from slamreplay.replay.dose_ranking import ranking
 from slamreplay.replay.folder import read_runs
+from slamreplay.report.dose_tables import critical_rows, notes
 from slamreplay.testing.synthetic import synthetic_bundle
 
 
@@ -223,6 +224,10 @@ def test_a_baseline_beyond_its_limit_is_told_and_shows_nothing(bundle):
 
     critical = only(found).critical[0]
     assert (critical.outcome, critical.level) == ("always", 0.0)
+    assert only(found).broke_first is None  # no dose is to blame
+    assert "beyond its limit undisturbed" in only(found).notes[0]
+    assert ranking(found.results)[0].undisturbed == ("error_max_m",)
+    assert critical_rows(found.results)[1][4] == "nothing more"
     (positive,) = [c for c in found.results.controls if c.kind == "positive"]
     assert positive.passed is False
     assert "undisturbed" in positive.text
@@ -353,3 +358,12 @@ def test_a_damaged_answer_is_refused_in_one_line(tmp_path):
     (tmp_path / "doses.json").write_text('{"doses_format": 99}')
     with pytest.raises(BundleError, match="doses format 99"):
         read_doses(tmp_path)
+
+
+def test_scans_that_are_missing_are_moments_that_count(bundle):
+    """At its rows this estimator is right; between them odometry drifts."""
+    curve = only(answer(bundle, plan(of_levels("scan_drop.even", [0.95]))))
+
+    undisturbed, dropped = (r.values["error_max_m"][0] for r in curve.responses)
+    assert dropped > undisturbed + 0.001
+    assert curve.responses[1].values["unposed_share"] == pytest.approx((0.0,), abs=0.35)

@@ -103,7 +103,8 @@ def test_clocks_of_another_epoch_tell_ages_from_the_fastest_message_on():
         return table.replace(t_log_ns=table["t_log_ns"] + 600_000 * NS_PER_S)
 
     bundle = driven(command=commands(), edit=elsewhere)
-    knots = [(START_NS + 600_000 * NS_PER_S + LATENCY_NS, START_NS)]
+    # Log times are carried over by the delay of some stream, which need not be the least there is.
+    knots = [(START_NS + 600_000 * NS_PER_S + LATENCY_NS - ns(0.015), START_NS)]
     clock = Clock(name="sensor", reason="header stamps", knots=knots)
     bundle = Bundle(bundle.manifest.model_copy(update={"clock": clock}),
                     {n: bundle.table(n) for n in TABLES}, bundle.grids())  # fmt: skip
@@ -128,6 +129,40 @@ def test_stamps_ahead_of_the_log_times_give_no_negative_age():
     assert "15 ms ahead of the log times" in found.clocks.caveats[0]
     for name in ("correction_s", "update_s", "pose_s", "odometry_s"):
         assert np.nanmin(getattr(of(found, "controller"), name)) >= 0.0, name
+
+
+def test_one_stream_that_is_stamped_ahead_makes_the_others_no_older():
+    def scans_late(table):
+        if table.schema.name not in ("scans", "poses"):
+            return table
+        return table.replace(t_log_ns=table["t_log_ns"] - ns(0.22))
+
+    plain, apart = (latency(driven(command=commands(), edit=e).view()) for e in (None, scans_late))
+
+    assert apart.clocks.basis == "shared"
+    assert "stamps of /scan lie 215 ms ahead" in apart.clocks.caveats[0]
+    np.testing.assert_allclose(of(apart, "controller").odometry_s,
+                               of(plain, "controller").odometry_s)  # fmt: skip
+    # Corrections are of those scans: told on their clock they are 215 ms older.
+    np.testing.assert_allclose(of(apart, "controller").correction_s,
+                               of(plain, "controller").correction_s + 0.215, atol=1e-6)  # fmt: skip
+    assert np.nanmin(of(apart, "controller").sensing_s) >= 0.0
+
+
+def test_poses_without_tf_are_carried_by_odometry_as_the_belief_is():
+    def no_tf(table):
+        if table.schema.name != "transforms":
+            return table
+        return table.take(np.asarray(table["is_static"]))
+
+    bundle = driven(command=commands(), edit=no_tf)
+    frames = bundle.manifest.frames.model_copy(update={"tree": []})
+    bundle = Bundle(bundle.manifest.model_copy(update={"frames": frames}),
+                    {n: bundle.table(n) for n in TABLES}, bundle.grids())  # fmt: skip
+    controller = of(latency(bundle.view()), "controller")
+
+    np.testing.assert_array_equal(controller.pose_s, controller.odometry_s)
+    assert np.nanmax(controller.correction_s) > 0.4
 
 
 def test_log_times_that_are_the_stamps_tell_no_latency():

@@ -198,7 +198,7 @@ def test_the_formula_is_what_a_replay_with_that_delay_shows():
 HOSTILE = {
     "budget": (TEXT.replace("controller_hz:", "controler_hz:"), "mean 'controller_hz'?"),
     "beside": (TEXT.replace("scenario:", "scenari:"), "mean 'scenario'?"),
-    "scenario": (TEXT.replace("scenario: healthy", "scenario: helthy"), "no scenario 'helthy'"),
+    "scenario": (TEXT.replace("{name: healthy", "{name: helthy"), "no scenario 'helthy'"),
     "no seed": (TEXT.replace("seed: 1\n", ""), "the key 'seed' is missing"),
     "stage": (TEXT.replace("stage_s: 0.08", "stage_s: -0.08"), "stages.0.stage_s' is -0.08"),
     "ms": (TEXT.replace("stage_s: 0.08", "stage_ms: 80"), "mean 'stage_s'?"),
@@ -249,7 +249,10 @@ def test_a_log_takes_the_scenarios_place_and_the_same_gives_the_same_bytes(tmp_p
     assert said[: len(said) // 2] == said[len(said) // 2 :]
     told = json.loads(said[: len(said) // 2])
     assert (told["log"], told["scenario"]) == (["healthy_short.bag"], None)
-    assert told["results"]["consumers"][0]["topic"] == "/cmd_vel"
+    assert [(c["name"], c["topic"]) for c in told["results"]["consumers"]] == [
+        ("controller", "/cmd_vel"), ("planner", "/plan"), ("goals", "/behavior_tree_log"),
+        ("controller", None), ("planner", None),
+    ]  # fmt: skip
     names = sorted(p.name for p in (tmp_path / "a").iterdir())
     assert names == ["latency_budget.png", "latency_budget.svg", "results.json", "results.md"]
     for name in names:
@@ -257,12 +260,14 @@ def test_a_log_takes_the_scenarios_place_and_the_same_gives_the_same_bytes(tmp_p
 
 
 def test_what_a_budget_cannot_take_is_said(tmp_path):
-    (tmp_path / "r.yaml").write_text(TEXT.replace("scenario: healthy\n", ""), encoding="utf-8")
+    (tmp_path / "r.yaml").write_text(
+        TEXT.replace("scenario: {name: healthy, seed: 1}\n", ""), encoding="utf-8"
+    )
 
-    with pytest.raises(UsageError, match="there is no LOG to ask"):
+    with pytest.raises(UsageError, match="there is no LOG to replay"):
         perturb(tmp_path / "o", recipe=tmp_path / "r.yaml")
     with pytest.raises(UsageError, match="a budget takes no --perturbation"):
         perturb(tmp_path / "o", recipe=RECIPE, perturbations=["tf_delay=1"])
-    with pytest.raises(UsageError, match="takes no options of a log"):
+    with pytest.raises(UsageError, match="simulated log takes no --map"):
         perturb(tmp_path / "o", recipe=RECIPE, start_s=3.0)
     assert not (tmp_path / "o").exists()

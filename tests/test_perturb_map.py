@@ -46,7 +46,11 @@ def other_place() -> OccupancyGrid:
 THREE = with_maps(BUNDLE, [(START_NS + 8 * k * NS_PER_S, redrawn(k)) for k in range(3)])
 
 
-@pytest.mark.parametrize("bundle", [BUNDLE, THREE])
+#: The room drawn twice, each for longer than the shortest stretch.
+TWO = with_maps(BUNDLE, [(START_NS + 12 * k * NS_PER_S, redrawn(k)) for k in range(2)])
+
+
+@pytest.mark.parametrize("bundle", [BUNDLE, TWO, THREE])
 @pytest.mark.parametrize(
     ("text", "level", "T"),
     [("map_shift.x", 0.7, [0.7, 0.0, 0.0]), ("map_shift.y", -2.0, [0.0, -2.0, 0.0])],

@@ -1,17 +1,21 @@
 """Odometry and inertial units, changed: by as much as is said, however a log tells them."""
 
+from contextlib import suppress
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from slamreplay.bundle.odometry import odometry_track, topic_track
+from slamreplay.bundle.schema import TABLES
 from slamreplay.bundle.tables import Table
 from slamreplay.errors import NotApplicableError
 from slamreplay.estimators.ekf.gyro import gyro_of
 from slamreplay.geometry import se2, se3
 from slamreplay.perturb import PERTURBATIONS
 from slamreplay.perturb.odometry_path import retold
+from slamreplay.testing import edits
 from slamreplay.testing.synthetic import START_NS, synthetic_bundle
 
 BUNDLE = synthetic_bundle(seconds=20.0, with_imu=True)
@@ -46,6 +50,12 @@ def upside_down(view):
     columns["rotation_xyzw"][own] = se3.quaternion(back[:, :3, :3])
     return view.with_table(transforms.replace(**columns))
 
+
+#: Perturbations of how the robot moves, and of conventions.
+MINE = (
+    "frame_swap", "gyro_bias", "handedness", "imu_drop", "odometry_drop", "odometry_noise",
+    "odometry_scale", "odometry_slip", "quaternion_order", "unit_error",
+)  # fmt: skip
 
 SHAPES = {
     "both": lambda view: view,
@@ -88,6 +98,31 @@ def test_however_a_log_tells_odometry_it_is_changed_alike(text, level, shape):
     np.testing.assert_allclose(other[:, :2], plain[:, :2], atol=1e-9)
     np.testing.assert_allclose(se2.wrap_angle(other[:, 2] - plain[:, 2]), 0.0, atol=1e-9)
     assert np.abs(other - path(BUNDLE.view()))[:, :2].max() > 0.05
+
+
+def tilted(view):
+    """The same way on a slope: with height, roll and pitch."""
+    table = view.table("transforms")
+    own = table["child_frame"] == "base_link"
+    count = int(own.sum())
+    rng = np.random.default_rng(3)
+    xyz, turn = table["translation_xyz"].copy(), table["rotation_xyzw"].copy()
+    yaw = se3.yaw_from_quaternion(turn[own])
+    xyz[own, 2] = rng.normal(0.0, 0.3, count)
+    turn[own] = se3.quaternion_from_rpy(*rng.normal(0.0, 0.1, (2, count)), yaw)
+    return view.with_table(table.replace(translation_xyz=xyz, rotation_xyzw=turn))
+
+
+@pytest.mark.parametrize("shape", ["tf", "upside down"])
+def test_height_roll_and_pitch_stay(shape):
+    view = SHAPES[shape](tilted(BUNDLE.view()))
+    at = np.arange(START_NS + 10**9, START_NS + 15 * 10**9, 10**8)
+
+    after = perturbed("odometry_scale.rotation", 0.7, view)
+
+    before, T = (v.transforms.lookup("odom", "base_link", at)[0] for v in (view, after))
+    np.testing.assert_allclose(T[:, 2, 3], before[:, 2, 3], atol=1e-6)
+    np.testing.assert_allclose(T[:, 2, :3], before[:, 2, :3], atol=1e-6)  # where up is in the base
 
 
 @pytest.mark.parametrize(("text", "level"), CHANGED)
@@ -252,6 +287,68 @@ def test_a_burst_without_odometry_is_one_gap_in_which_nothing_is_known(shape):
         perturbed("odometry_drop.burst", 30.0)
 
 
+def scattered(bundle):
+    """The same log, its rows in any order."""
+    rng = np.random.default_rng(1)
+    tables = {}
+    for name in ("odometry", "imu", "transforms"):
+        table = bundle.table(name)
+        tables[name] = table.take(rng.permutation(len(table)))
+    return edits.rebuilt(bundle, tables)
+
+
+@pytest.mark.parametrize(("text", "level"), CHANGED)
+def test_the_order_of_rows_is_of_no_matter(text, level):
+    plain, other = (perturbed(text, level, b.view()) for b in (BUNDLE, scattered(BUNDLE)))
+
+    for one in (path, lambda view: topic_track(view, view.table("odometry")).xyyaw):
+        np.testing.assert_allclose(one(other), one(plain), atol=1e-9)
+
+
+def damaged():
+    bundle = synthetic_bundle(seconds=6.0, with_imu=True)
+    t_ns = bundle.table("scans").t_ns
+    rng = np.random.default_rng(0)
+    columns = {
+        "odometry": ("position_xyz", "orientation_xyzw"),
+        "transforms": ("translation_xyz", "rotation_xyzw"),
+        "imu": ("angular_velocity_xyz", "orientation_xyzw"),
+        "initial_poses": ("orientation_xyzw",),
+    }
+
+    def filled(value, share):
+        tables = {}
+        for name, them in columns.items():
+            table = bundle.table(name)
+            spoilt = {column: table[column].copy() for column in them}
+            for numbers in spoilt.values():
+                numbers[rng.random(len(numbers)) < share] = value
+            tables[name] = table.replace(**spoilt)
+        return edits.rebuilt(bundle, tables)
+
+    return {
+        "a gap": edits.with_gap(bundle, int(t_ns[15]), int(t_ns[45])),
+        "repeated stamps": edits.with_repeated_stamps(bundle),
+        "NaN": filled(np.nan, 0.2),
+        "zeros": filled(0.0, 1.0),
+        "far off": filled(1e150, 0.2),
+        "one row": edits.rebuilt(
+            bundle, {n: bundle.table(n).take(np.arange(1)) for n in ("odometry", "imu", "scans")}
+        ),
+        "nothing": edits.rebuilt(bundle, {n: Table.empty(TABLES[n]) for n in TABLES}),
+    }
+
+
+@pytest.mark.parametrize("damage", damaged().items(), ids=lambda pair: pair[0])
+def test_damaged_logs_are_changed_or_refused_with_a_line(damage):
+    view = damage[1].view()
+    for name in MINE:
+        for variant, about in PERTURBATIONS.load(name).variants.items():
+            level = 1.0 if about.is_switch else min(0.5, about.high)
+            with suppress(NotApplicableError):
+                perturbed(f"{name}.{variant}", level, view)
+
+
 def test_what_is_not_there_cannot_be_changed():
     bare = without_topic(without_tf(BUNDLE.view()))
     for text, level in (*CHANGED, ("odometry_drop.random", 0.5), ("odometry_drop.burst", 1.0)):
@@ -261,6 +358,19 @@ def test_what_is_not_there_cannot_be_changed():
     for text in ("gyro_bias.yaw", "imu_drop.random", "imu_drop.burst"):
         with pytest.raises(NotApplicableError, match="no IMU"):
             perturbed(text, 0.5, still)
+
+
+def test_a_robot_that_stands_neither_slips_nor_scatters():
+    table, transforms = BUNDLE.table("odometry"), BUNDLE.table("transforms")
+    still = table.replace(
+        position_xyz=np.zeros_like(table["position_xyz"]),
+        orientation_xyzw=np.tile([0.0, 0.0, 0.0, 1.0], (len(table), 1)),
+    )
+    view = without_tf(BUNDLE.view().with_table(transforms)).with_table(still)
+    for text, level in CHANGED:
+        if not text.startswith("odometry_scale"):
+            with pytest.raises(NotApplicableError, match=r"does not|drives 0 m"):
+                perturbed(text, level, view)
 
 
 def test_two_ways_about_a_third_frame_are_no_odometry_that_could_be_changed():

@@ -351,6 +351,13 @@ def test_a_laser_without_a_mount_gets_one(frame):
     np.testing.assert_allclose(scan_set(after).xyyaw_base_laser, [0.3, 0.0, 0.0], atol=1e-12)
 
 
+def disc_through(ends):
+    """Middle and radius of the disc through points: least squares on x^2 + y^2 = 2ax + 2by + c."""
+    A = np.column_stack([2 * ends, np.ones(len(ends))])
+    a, b, c = np.linalg.lstsq(A, (ends**2).sum(axis=1), rcond=None)[0]
+    return np.array([a, b]), np.sqrt(c + a * a + b * b)
+
+
 def test_people_stand_where_their_beams_say_from_scan_to_scan():
     """One person alone: the ends of what they hide lie on a disc that moves at a walking pace."""
     scans = scan_set(perturbed("people.hidden", 0.004))
@@ -362,11 +369,9 @@ def test_people_stand_where_their_beams_say_from_scan_to_scan():
         bearing, reach = scans.bearings(k)[hidden[k]], scans.ranges_m[k][hidden[k]]
         ends = np.column_stack([reach * np.cos(bearing), reach * np.sin(bearing)])
         ends = se2.transform_points(se2.compose(pose, scans.xyyaw_base_laser), ends)
-        # The disc through the ends: least squares on x^2 + y^2 = 2 a x + 2 b y + c.
-        A = np.column_stack([2 * ends, np.ones(len(ends))])
-        a, b, c = np.linalg.lstsq(A, (ends**2).sum(axis=1), rcond=None)[0]
-        assert np.sqrt(c + a * a + b * b) == pytest.approx(0.22, abs=0.02)
-        middles.append((a, b))
+        middle, radius = disc_through(ends)
+        assert radius == pytest.approx(0.22, abs=0.02)
+        middles.append(middle)
 
     steps = np.hypot(*np.diff(middles, axis=0).T) / (np.diff(scans.t_ns[rows]) / 1e9)
     assert len(rows) >= 5
@@ -378,7 +383,7 @@ def spun(time_increment_s: float, *, hangs: bool = False) -> Bundle:
     """A robot that stands among nothing and turns, with a laser that sees all around."""
     t_s = np.arange(0.0, 20.0, 0.1)
     odometry_s = np.arange(0.0, 20.1, 0.05)
-    poses = np.column_stack([0 * odometry_s, 0 * odometry_s, se2.wrap_angle(0.5 * odometry_s)])
+    poses = np.column_stack([0 * odometry_s, 0 * odometry_s, se2.wrap_angle(2.0 * odometry_s)])
     sign = -1.0 if hangs else 1.0
     mount = tf_rows("base_link", "laser", np.zeros(1), np.zeros((1, 3)), is_static=True)
     if hangs:
@@ -407,17 +412,37 @@ def test_people_are_the_same_to_a_laser_that_hangs_upside_down(time_increment_s)
     np.testing.assert_allclose(ranges_of(upright), ranges_of(turned), atol=1e-5)
 
 
-def test_people_are_deskewed_like_all_else():
-    """While the robot turns, what a slow scan sees of somebody is a disc again once deskewed."""
-    scans = scan_set(perturbed("people.hidden", 0.003, spun(0.1 / 720).view()))
-    checked = 0
+def middles_of_people(view):
+    """By scan the middle, in the odometry frame, of the one who hides beams of it."""
+    scans = scan_set(view)
+    found = {}
     for k in np.flatnonzero(scans.hits.sum(axis=1) >= 8):
-        ends = scans.points(k)
-        A = np.column_stack([2 * ends, np.ones(len(ends))])
-        a, b, c = np.linalg.lstsq(A, (ends**2).sum(axis=1), rcond=None)[0]
-        assert np.sqrt(c + a * a + b * b) == pytest.approx(0.22, abs=0.03)
-        checked += 1
-    assert checked >= 5
+        ends = se2.transform_points(scans.odometry.at(scans.t_ns[[k]]).xyyaw[0], scans.points(k))
+        found[int(k)], radius = disc_through(ends)
+        assert radius == pytest.approx(0.22, abs=0.03)
+    return found
+
+
+def test_people_are_where_they_are_when_a_late_beam_meets_them():
+    """A robot that turns by 0.2 rad while it scans: deskewed, its people are the same."""
+    at_once = middles_of_people(perturbed("people.hidden", 0.003, spun(0.0).view()))
+    late = middles_of_people(perturbed("people.hidden", 0.003, spun(0.1 / 720).view()))
+
+    both = sorted(set(at_once) & set(late))
+    assert len(both) >= 5
+    for k in both:  # who walks on for 0.1 s at the most
+        assert np.hypot(*(late[k] - at_once[k])) < 0.16
+
+
+def test_somebody_at_the_seam_of_a_round_scan_is_met_on_both_sides_of_it():
+    hidden = np.isfinite(ranges_of(perturbed("people.hidden", 0.02, spun(0.0).view())))
+    hidden = hidden.reshape(-1, 720)
+
+    wraps = hidden[:, 0] & hidden[:, -1]
+    edges = np.count_nonzero(hidden != np.roll(hidden, 1, axis=1), axis=1)
+    assert wraps.any()
+    assert set(edges[(hidden[:, 0] | hidden[:, -1])]) <= {2, 4, 6}
+    assert np.count_nonzero(hidden[:, 0] ^ hidden[:, -1]) <= 2 * np.count_nonzero(wraps)
 
 
 def test_nobody_hides_what_is_nearer_than_they_are():

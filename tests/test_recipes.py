@@ -169,6 +169,26 @@ def test_page_and_figures_are_there(recipe, answered):
     assert all(f"({name})" in page for name in figures)
 
 
+def test_margins_are_checked_by_their_script(answered, tmp_path):
+    folder = ROOT / "recipes" / "ci-gate"
+    results = answered / folder.name / "results.json"
+    curves = json.loads(results.read_text(encoding="utf-8"))["results"]["curves"]
+    demanded = json.loads((folder / "margins.json").read_text(encoding="utf-8"))
+    held = {p: {e: demanded[p][e] for e in by_estimator} for p, by_estimator in curves.items()}
+    margins = tmp_path / "margins.json"
+
+    def checked():
+        command = [sys.executable, folder / "check.py", results, margins]
+        return subprocess.run(command, capture_output=True, text=True)
+
+    margins.write_text(json.dumps(held), encoding="utf-8")
+    assert (checked().returncode, checked().stdout) == (0, "every margin holds\n")
+    margins.write_text(json.dumps({"initial_pose.offset": {"amcl": 4.0}}), encoding="utf-8")
+    assert checked().returncode == 1
+    margins.write_text(json.dumps({"scan_delay.stamp": {"amcl": 0.1}}), encoding="utf-8")
+    assert "not tried" in checked().stdout
+
+
 SMALL = BREATHING.read_text(encoding="utf-8").replace("runs: 1000", "runs: 30")
 
 

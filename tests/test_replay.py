@@ -10,7 +10,8 @@ from slamreplay.bundle.schema import TABLES
 from slamreplay.bundle.store import write_bundle
 from slamreplay.bundle.view import Bundle
 from slamreplay.errors import BundleError, OutputError, UsageError
-from slamreplay.replay import parallel, run_cache, runner
+from slamreplay.estimators.dead_reckoning import DeadReckoning
+from slamreplay.replay import one_trial, parallel, run_cache, runner
 from slamreplay.replay.design import design, parse_perturbation
 from slamreplay.replay.folder import is_runs, read_runs, write_runs
 from slamreplay.replay.metrics import trial_metrics
@@ -233,3 +234,16 @@ def test_metrics_are_zero_at_the_baseline_and_grow_with_the_level(bundle):
     assert baseline["rows"] == 80
     assert set(unmet.values()) == {None}
     assert all(v is None or np.isfinite(v) for v in near.values())
+
+
+def test_an_estimator_whose_arithmetic_breaks_down_says_so_and_the_others_go_on(monkeypatch):
+    class Singular(DeadReckoning):
+        def run(self, view, *, seed):
+            raise np.linalg.LinAlgError("Singular matrix")
+
+    monkeypatch.setattr(one_trial, "configured", lambda name, parameters: Singular())
+
+    run = one_trial.run_trial(synthetic_bundle(seconds=2.0), Trial("b", "dead_reckoning", 0))
+
+    assert run.estimate is None
+    assert run.not_applicable == "dead_reckoning: its arithmetic broke down (Singular matrix)"

@@ -15,6 +15,7 @@ from slamreplay.bundle.run import Trial, run_bytes
 from slamreplay.bundle.schema import TABLES
 from slamreplay.bundle.store import write_bundle
 from slamreplay.bundle.view import Bundle
+from slamreplay.cli.progress import time_left
 from slamreplay.replay.design import design
 from slamreplay.replay.forecast import Forecast
 from slamreplay.replay.runner import Replayer, replay
@@ -138,6 +139,9 @@ def test_the_longest_go_first_and_what_was_never_seen_before_them():
 
 def test_the_forecast_weighs_trials_by_their_estimator():
     forecast = Forecast()
+    new, other = Trial("b", "new", 0), Trial("b", "other", 0)
+    assert forecast.left_s([new], {other: 4.0}, 2) is None
+    assert forecast.share([], [new], {other: 4.0}) == 0.0
     for seconds in (9.0, 30.0, 10.0):
         forecast.learn(Trial("b", "slow", 0), seconds)
     forecast.learn(Trial("b", "fast", 0), 1.0)
@@ -149,6 +153,15 @@ def test_the_forecast_weighs_trials_by_their_estimator():
     assert forecast.share([slow], [fast], {slow: 4.0}) == pytest.approx(14.0 / 21.0)
     assert forecast.share([slow], [], {slow: 99.0}) == pytest.approx(19.5 / 20.0)
     assert Counter(map(forecast.seconds, [slow, fast])) == {10.0: 1, 1.0: 1}
+
+
+@pytest.mark.parametrize(
+    ("elapsed_s", "share", "says"),
+    [(5.0, 0.0, "-:--:--"), (10.0, 0.25, "0:00:30 left"), (9.0, 1.0, "0:00:00 left"),
+     (900.0, 0.1, "2:15:00 left")],
+)  # fmt: skip
+def test_the_time_left_is_told_by_the_share_of_the_work(elapsed_s, share, says):
+    assert time_left(elapsed_s, share) == says
 
 
 def _is_there(pid: int) -> bool:

@@ -169,6 +169,7 @@ def test_report_json_has_the_contracts_keys_and_is_valid(post, bare):
         assert list(content) == [
             "schema_version", "slamreplay", "bundle", "verdict", "intervals", "changed_regions",
             "reference", "failure_mode", "root_cause", "stops", "actions", "findings", "trials",
+            "design",
             "ledger", "jumps", "trace", "latency",
         ]  # fmt: skip
         assert Report.model_validate_json(build(each).json_text()) == build(each)

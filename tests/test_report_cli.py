@@ -109,7 +109,10 @@ def test_list_gives_names_and_docs(app, kind):
 
     assert rows
     assert all(row["name"] and row["doc"] for row in rows)
-    assert [line.split()[0] for line in text.splitlines()] == [row["name"] for row in rows]
+    told = [line.split()[0] for line in text.splitlines() if line]
+    if kind == "perturbations":  # they are grouped
+        told = [name for name in told[1:] if "." in name]
+    assert told == [row["name"] for row in rows]
 
 
 def test_list_of_perturbations_has_the_unit_of_every_level(app):
@@ -117,9 +120,25 @@ def test_list_of_perturbations_has_the_unit_of_every_level(app):
 
     assert rows["tf_delay.odometry"]["unit"] == "s"
     assert rows["scan_drop.random"]["baseline"] == 0.0
+    assert rows["scan_drop.random"]["touches"] == ["scans"]
+    assert (rows["scan_drop.random"]["low"], rows["scan_drop.random"]["high"]) == (0, 0.999)
+    assert rows["initial_pose.global"]["is_switch"]
     for name in PERTURBATIONS:
         for variant in PERTURBATIONS.load(name).variants:
             assert f"{name}.{variant}" in rows
+
+
+def test_list_of_perturbations_says_of_each_what_it_changes_and_what_levels_mean(app):
+    text = run(app, "list", "perturbations").stdout
+
+    groups = dict(part.split("\n", 1) for part in text.strip().split("\n\n")[1:])
+    assert [head.partition(":")[0] for head in groups] == list(PERTURBATIONS)
+    (head,) = (head for head in groups if head.startswith("odometry_scale:"))
+    lines = groups[head].splitlines()
+    assert lines[0] == "  changes odometry, transforms"
+    assert lines[1].split()[:5] == ["odometry_scale.translation", "ratio,", "1", "(0", "to"]
+    assert "settings min_score" in text
+    assert "initial_pose.global                 0 or 1" in " ".join(text.split(" "))
 
 
 def test_unknown_kind_is_refused(app):

@@ -7,6 +7,7 @@ from slamreplay.bundle.odometry import odometry_track
 from slamreplay.bundle.run import run_bytes
 from slamreplay.bundle.scans import scan_set
 from slamreplay.bundle.sharing import MOST, Shared
+from slamreplay.bundle.tables import Ragged
 from slamreplay.estimators.amcl import estimator as amcl
 from slamreplay.estimators.scan_matching import local
 from slamreplay.replay.design import design
@@ -97,3 +98,31 @@ def test_equal_objects_are_not_the_same_and_old_results_go():
     with pytest.raises(ZeroDivisionError):
         shared.of("fails", 0, [a], lambda: 1 // 0)
     assert shared.of("fails", 0, [a], lambda: 1) == 1
+
+
+def test_scans_of_one_length_are_the_matrix_that_padding_gives():
+    view = made(2.0).view()
+    table = view.table("scans")
+    ranges = table["ranges_m"]
+    short = [ranges[k][: len(ranges[k]) - (k == 3)] for k in range(len(table))]
+
+    whole, padded = scan_set(view), scan_set(view.with_table(table.replace(ranges_m=short)))
+
+    assert np.isnan(padded.ranges_m[3, -1])
+    same = np.arange(len(table)) != 3
+    assert np.array_equal(whole.ranges_m[same], padded.ranges_m[same], equal_nan=True)
+    assert whole.ranges_m.flags.writeable
+    assert whole.ranges_m.flags.c_contiguous
+    assert not np.shares_memory(whole.ranges_m, ranges.values)
+
+
+@pytest.mark.parametrize("index", [[], [2], [3, 0, 0, 1], [-1, 1]])
+def test_rows_of_one_length_are_taken_as_those_of_any(index):
+    whole = Ragged.of(np.arange(20).reshape(4, 5), np.float32)
+    index = np.array(index, dtype=np.int64)
+
+    for rows in (whole, whole.rows(0, 4), Ragged.of([*whole, [1.0]], np.float32).rows(0, 4)):
+        taken = rows.take(index)
+        assert [row.tolist() for row in taken] == [whole[k % 4].tolist() for k in index]
+        assert taken.values.dtype == np.float32
+        assert taken.offsets.tolist() == [5 * k for k in range(len(index) + 1)]

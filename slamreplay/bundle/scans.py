@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from slamreplay.bundle.no_return import told_as_range_max
 from slamreplay.bundle.odometry import odometry_track
+from slamreplay.bundle.tables import Ragged
 from slamreplay.bundle.track import PoseTrack
 from slamreplay.bundle.view import BundleView
 from slamreplay.geometry import se2, se3
@@ -147,11 +148,7 @@ def _returns(view: BundleView, role: str) -> _Returns | None:
     if table is None or not len(table):
         return None
     table = table.sorted_by_time()
-    ranges = table["ranges_m"]
-    n, width = len(table), int(ranges.lengths.max(initial=0))
-    matrix = np.full((n, width), np.nan, dtype=np.float32)
-    column = np.arange(len(ranges.values)) - np.repeat(ranges.offsets[:-1], ranges.lengths)
-    matrix[np.repeat(np.arange(n), ranges.lengths), column] = ranges.values
+    matrix = _matrix(table["ranges_m"])
     low, high = table["range_min_m"][:, None], table["range_max_m"][:, None]
     hits, misses = hits_and_misses(matrix, low, high)
     return _Returns(
@@ -165,6 +162,18 @@ def _returns(view: BundleView, role: str) -> _Returns | None:
         misses,
         table["range_max_m"],
     )
+
+
+def _matrix(ranges: Ragged) -> NDArray[np.float32]:
+    """(N, B) the rows as a matrix of its own; NaN pads shorter ones."""
+    n, width = len(ranges), int(ranges.lengths.max(initial=0))
+    if (ranges.lengths == width).all():  # an index of every beam would be four times as large
+        first = int(ranges.offsets[0])
+        return np.array(ranges.values[first : first + n * width]).reshape(n, width)
+    matrix = np.full((n, width), np.nan, dtype=np.float32)
+    column = np.arange(len(ranges.values)) - np.repeat(ranges.offsets[:-1], ranges.lengths)
+    matrix[np.repeat(np.arange(n), ranges.lengths), column] = ranges.values
+    return matrix
 
 
 def hits_and_misses(

@@ -159,9 +159,11 @@ def read_table(path: Path, manifest: Manifest, name: str) -> Table:
     file = path / "tables" / f"{name}.parquet"
     _check(file, manifest, name)
     try:
-        return Table.from_arrow(TABLES[name], _arrow(file))
+        table = Table.from_arrow(TABLES[name], _arrow(file))
     except pa.ArrowException as error:
         raise BundleError(f"not a readable Parquet file: {error}", where=file) from error
+    pa.default_memory_pool().release_unused()  # it keeps twice what a large table takes
+    return table
 
 
 def read_columns(path: Path, manifest: Manifest, name: str, columns: Sequence[str]) -> pa.Table:

@@ -80,7 +80,13 @@ class Ragged:
 
     def take(self, index: NDArray[np.int64]) -> Ragged:
         """The rows at `index`, in that order."""
-        lengths = self.lengths[index]
+        lengths = self.lengths
+        if len(lengths) and bool((lengths == lengths[0]).all()):
+            # An index of every entry would be several times as large as the entries.
+            width, first = int(lengths[0]), int(self.offsets[0])
+            rows = self.values[first : first + width * len(lengths)].reshape(len(lengths), width)
+            return Ragged(rows[index].ravel(), np.arange(len(index) + 1, dtype=np.int64) * width)
+        lengths = lengths[index]
         offsets = np.concatenate([[0], np.cumsum(lengths)])
         entry = np.arange(offsets[-1]) - np.repeat(offsets[:-1] - self.offsets[index], lengths)
         return Ragged(self.values[entry], offsets)

@@ -242,7 +242,8 @@ class BundleView:
         if topic is None:
             return None
         table = self.table(ROLE_TABLES[role])
-        return table.take(table["topic"] == topic)
+        mine = table["topic"] == topic
+        return table if len(table) and bool(np.all(mine)) else table.take(mine)
 
     @property
     def span(self) -> tuple[int, int]:

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from slamreplay.errors import UsageError
 
 if TYPE_CHECKING:
-    from slamreplay.bundle.view import Bundle
     from slamreplay.ingest.options import IngestOptions
     from slamreplay.recipes.budget import BudgetRecipe
 
@@ -44,6 +42,7 @@ def run_budget(
     from slamreplay.cli.lab import show
     from slamreplay.cli.main import cache_folder
     from slamreplay.cli.progress import progress_bar
+    from slamreplay.cli.scenario import log_or_scenario
     from slamreplay.labs.folder import check_results_target, write_results
     from slamreplay.labs.latency_budget.answer import answer
 
@@ -53,40 +52,18 @@ def run_budget(
         raise UsageError(f"seed {seed} is negative")
     seed = recipe.seed if seed is None else seed
     check_results_target(output)
-    with _log(recipe, path, logs, options) as bundle:
+    with log_or_scenario(logs, recipe.scenario, options, path) as bundle:
         with progress_bar("replaying") as progress:
             found = answer(bundle, recipe.parameters, seed, progress, cache_folder() / "runs")
         head = {
             "question": recipe.question,
             "log": [source.name for source in bundle.manifest.sources],
             "bundle": bundle.manifest.bundle_id,
-            "scenario": None if logs else recipe.scenario,
+            "scenario": None
+            if logs or recipe.scenario is None
+            else dict(zip(("name", "seed"), recipe.scenario, strict=True)),
             "seed": seed,
             "budget": recipe.parameters.model_dump(mode="json"),
         }
     write_results(output, head, found)
     show(head, found, output, as_json=as_json)
-
-
-@contextmanager
-def _log(
-    recipe: BudgetRecipe, path: Path, logs: Sequence[Path], options: IngestOptions
-) -> Iterator[Bundle]:
-    from slamreplay.cli.main import cache_folder
-    from slamreplay.cli.options import evidence
-    from slamreplay.ingest.options import IngestOptions as Options
-
-    if logs:
-        with evidence(logs, options, cache=cache_folder() / "bundles") as bundle:
-            yield bundle
-        return
-    if recipe.scenario is None:
-        raise UsageError("there is no LOG to ask", where=path,
-                         hint="name one, or write scenario: healthy into the recipe")  # fmt: skip
-    if options != Options():
-        raise UsageError("a scenario takes no options of a log", where=path, hint="leave them out")
-    from slamreplay.simulate.bundled import bundle_of
-    from slamreplay.simulate.recording import record
-    from slamreplay.simulate.scenarios import scenario
-
-    yield bundle_of(record(scenario(recipe.scenario)), name=recipe.scenario)

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 import typer
@@ -14,12 +12,11 @@ import typer
 from slamreplay.errors import UsageError
 
 if TYPE_CHECKING:
-    from slamreplay.bundle.view import Bundle
-    from slamreplay.doses.page import Rows
     from slamreplay.doses.plan import Plan
     from slamreplay.ingest.options import IngestOptions
     from slamreplay.recipes import DoseRecipe
     from slamreplay.replay.dose import DoseResults
+    from slamreplay.report.dose_tables import Rows
 
 
 def run_design(
@@ -55,6 +52,7 @@ def run_design(
     from slamreplay.bundle.atomic import check_target
     from slamreplay.cli.main import cache_folder, watch_folder
     from slamreplay.cli.progress import progress_bar
+    from slamreplay.cli.scenario import log_or_scenario
     from slamreplay.doses.answer import answer
     from slamreplay.doses.folder import write_answer
     from slamreplay.doses.page import results_json
@@ -71,7 +69,7 @@ def run_design(
         typer.echo(line, err=True)
     with (
         watched(watch_folder(), output) as watch,
-        _evidence(recipe, path, logs, how) as (bundle, is_kept),
+        log_or_scenario(logs, recipe.scenario, how, path) as bundle,
     ):
         with progress_bar("replaying") as progress:
             found = answer(bundle, plan, parameters=given.of, cache=cache_folder(),
@@ -79,7 +77,9 @@ def run_design(
         log: dict[str, Any] = {"bundle_id": bundle.manifest.bundle_id, "scenario": None}
         if not logs and recipe.scenario is not None:
             log["scenario"] = dict(zip(("name", "seed"), recipe.scenario, strict=True))
-        write_answer(output, bundle, plan, found, log, keep_bundle=not is_kept)
+        own = bundle.path.resolve() if logs and bundle.path is not None else None
+        keep = own is None or own != logs[0].resolve()
+        write_answer(output, bundle, plan, found, log, keep_bundle=keep, cache=cache_folder())
     if as_json:
         typer.echo(results_json(plan, found.results, log), nl=False)
         return
@@ -102,58 +102,9 @@ def _overridden(plan: Plan, estimators: Sequence[str], seed: int | None) -> Plan
     return plan
 
 
-@contextmanager
-def _evidence(
-    recipe: DoseRecipe, path: Path, logs: Sequence[Path], how: IngestOptions
-) -> Iterator[tuple[Bundle, bool]]:
-    """The bundle, and whether it stays where it is after the block."""
-    from slamreplay.cli import options
-    from slamreplay.cli.main import bundle_folder
-    from slamreplay.ingest.options import IngestOptions
-
-    if logs:
-        with options.evidence(logs, how, cache=bundle_folder()) as bundle:
-            yield bundle, bundle.path is not None and bundle.path.resolve() == logs[0].resolve()
-        return
-    if recipe.scenario is None:
-        raise UsageError("there is no LOG to replay", where=path,
-                         hint="name one, or a scenario in the recipe")  # fmt: skip
-    if how != IngestOptions():
-        raise UsageError(
-            "a simulated log takes no --map, --topics, --robot, --reference, --start or --end",
-            where=path,
-            hint="leave them out, or name a LOG",
-        )
-    from slamreplay.errors import OutputError
-    from slamreplay.ingest.bundle_cache import made_once
-
-    scenario = recipe.scenario
-    asked = [f"scenario {scenario}"]
-    try:
-        bundle = made_once(bundle_folder(), asked, lambda target: _simulated(scenario, target))
-    except (OSError, OutputError):  # a cache that cannot be written is not used
-        with TemporaryDirectory(prefix="slamreplay-") as folder:
-            yield _simulated(scenario, Path(folder) / "log.bundle"), False
-        return
-    yield bundle, False
-
-
-def _simulated(scenario: tuple[str, int], target: Path) -> Bundle:
-    """The bundle of a scenario with a seed, written to `target`."""
-    from slamreplay.cli.progress import progress_bar
-    from slamreplay.ingest.pipeline import ingest
-    from slamreplay.simulate.pipeline import simulate
-
-    name, seed = scenario
-    with TemporaryDirectory(prefix="slamreplay-") as folder, progress_bar("simulating"):
-        log = Path(folder) / f"{name}.mcap"
-        simulate(name, log, seed=seed)
-        return ingest([log], target)
-
-
 def _told(results: DoseResults, log: Mapping[str, Any], trials: int) -> str:
     """Question, table, what broke first, and every failed control."""
-    from slamreplay.doses.page import critical_rows, notes, ranking_rows, warning
+    from slamreplay.report.dose_tables import critical_rows, notes, ranking_rows, warning
 
     failed = [warning(c) for c in results.controls if c.passed is False]
     scenario = log["scenario"]
@@ -161,7 +112,9 @@ def _told(results: DoseResults, log: Mapping[str, Any], trials: int) -> str:
     lines = [results.question, "", *failed, *([""] if failed else [])]
     lines += [f"critical level: {results.limits[0].title}", _text(critical_rows(results)), ""]
     lines += ["what breaks first:", _text(ranking_rows(results)), ""]
-    lines += [f"({of}{trials} trials, seeds {results.seeds[0]} to {results.seeds[-1]})"]
+    first, *others = results.seeds
+    seeds = f"seeds {first} to {others[-1]}" if others else f"seed {first}"
+    lines += [f"({of}{trials} trials, {seeds})"]
     lines += [f"note: {note}" for note in notes(results) if note not in failed]
     return "\n".join(lines)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from math import isfinite
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -30,6 +31,9 @@ def _list(
     rows = _rows(kind)
     if as_json:
         typer.echo(json.dumps(rows, indent=1))
+        return
+    if kind == "perturbations":
+        typer.echo(_grouped(rows))
         return
     columns = [key for key in rows[0] if key != "doc"] if rows else []
     widths = {key: max(len(str(row[key])) for row in rows) for key in columns}
@@ -70,16 +74,52 @@ def _perturbations() -> list[dict[str, object]]:
 
     rows: list[dict[str, object]] = []
     for name in PERTURBATIONS:
-        for variant, about in PERTURBATIONS.load(name).variants.items():
+        perturbation = PERTURBATIONS.load(name)
+        for variant, about in perturbation.variants.items():
             rows.append(
                 {
                     "name": f"{name}.{variant}",
                     "unit": about.unit,
                     "baseline": about.baseline,
+                    "low": about.low,
+                    "high": about.high if isfinite(about.high) else None,
+                    "is_switch": about.is_switch,
+                    "touches": sorted(perturbation.touches),
+                    "about": _first_line(perturbation),
                     "doc": about.doc,
                 }
             )
     return rows
+
+
+def _grouped(rows: list[dict[str, object]]) -> str:
+    """Each perturbation with what it touches, and below it what its levels mean."""
+    from slamreplay.bundle.schema import TABLES
+
+    lines = ["NAME.VARIANT=LEVEL; of the level: unit, what changes nothing, least to greatest"]
+    cells = [[str(row["name"]), _level(row), str(row["doc"])] for row in rows]
+    widths = [max(len(cell[k]) for cell in cells) for k in (0, 1)]
+    before = ""
+    for row, (name, level, doc) in zip(rows, cells, strict=True):
+        group = name.partition(".")[0]
+        if group != before:
+            touches = row["touches"]
+            assert isinstance(touches, list)
+            settings = [t for t in touches if t not in TABLES and t != "map"]
+            evidence = [t for t in touches if t not in settings]
+            about = f"{', '.join(evidence)}{'settings ' * bool(settings)}{', '.join(settings)}"
+            lines += ["", f"{group}: {row['about']}", f"  changes {about}"]
+        lines.append(f"  {name:<{widths[0]}}  {level:<{widths[1]}}  {doc}")
+        before = group
+    return "\n".join(lines)
+
+
+def _level(row: dict[str, object]) -> str:
+    """Unit, baseline and range of a variant's level: "m, 0 (-10 to 10)"."""
+    if row["is_switch"]:
+        return "0 or 1"
+    to = f"{row['low']:g} up" if row["high"] is None else f"{row['low']:g} to {row['high']:g}"
+    return f"{row['unit']}, {row['baseline']:g} ({to})"
 
 
 def _registry(kind: str) -> Registry:

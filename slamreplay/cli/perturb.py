@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -11,6 +13,8 @@ from slamreplay.cli import options
 from slamreplay.errors import UsageError
 
 if TYPE_CHECKING:
+    from slamreplay.bundle.run import Run
+    from slamreplay.bundle.view import Bundle
     from slamreplay.replay.metrics import Metrics
 
 Estimators = Annotated[
@@ -116,16 +120,9 @@ def perturb(
         end_s=end_s,
     )
     if recipe is not None:
-        from slamreplay.cli.lab import run_lab
-        from slamreplay.recipes import BudgetRecipe, LabRecipe, read_recipe
+        from slamreplay.cli.recipe import Given, run_recipe
 
-        asked = read_recipe(recipe)
-        of_runs: dict[str, object] = {
-            "--perturbation": perturbations,
-            "--estimator": estimators,
-            "--parameters": parameters,
-        }
-        of_logs: dict[str, object] = {
+        ingested = {
             "--map": map_yaml,
             "--topics": topics,
             "--robot": robot,
@@ -133,51 +130,31 @@ def perturb(
             "--start": start_s,
             "--end": end_s,
         }
-        is_lab = isinstance(asked, LabRecipe)
-        foreign = {"LOG": logs, **of_runs, **of_logs} if is_lab else of_runs
-        names = [name for name, value in foreign.items() if value not in (None, [])]
-        if isinstance(asked, LabRecipe):
-            run_lab(asked, recipe, output, seed=seed, given=names, as_json=as_json)
-            return
-        if isinstance(asked, BudgetRecipe):
-            from slamreplay.cli.budget import run_budget
-
-            run_budget(
-                asked, recipe, logs or (), how, output, seed=seed, given=names, as_json=as_json
-            )
-            return
-        from slamreplay.cli.dose import run_design
-
-        if perturbations:
-            raise UsageError("the recipe says what is perturbed: it takes no --perturbation",
-                             where=recipe, hint="leave it out")  # fmt: skip
-        run_design(
-            asked,
-            recipe,
-            output,
-            logs=logs or (),
-            how=how,
-            estimators=estimators or (),
-            parameters=parameters or (),
-            robot=robot,
-            seed=seed,
-            as_json=as_json,
+        asked = Given(
+            logs or (),
+            how,
+            perturbations or (),
+            estimators or (),
+            parameters or (),
+            robot,
+            seed,
+            [name for name, value in ingested.items() if value is not None],
         )
+        run_recipe(recipe, output, asked, as_json=as_json)
         return
     if not logs:
         raise UsageError("there is no LOG to replay", hint="name one, or a lab with --recipe")
     from slamreplay.bundle.atomic import check_target
-    from slamreplay.cli.main import bundle_folder, run_folder, watch_folder
+    from slamreplay.bundle.kept import kept
+    from slamreplay.cli.main import bundle_folder, cache_folder, run_folder, watch_folder
     from slamreplay.cli.progress import progress_bar
-    from slamreplay.consistency.evidence.references import references_of
     from slamreplay.estimators import ESTIMATORS
     from slamreplay.replay.design import design, parse_perturbation, usual_estimators
     from slamreplay.replay.folder import RUNS, write_runs
-    from slamreplay.replay.metrics import trial_metrics
     from slamreplay.replay.parameters import Configuration, read_parameters
+    from slamreplay.replay.run_cache import run_key
     from slamreplay.replay.runner import Replayer
     from slamreplay.replay.watch import watched
-    from slamreplay.report.metrics import asked_of, nees_metrics
 
     check_target(output, RUNS)
     for text in perturbations or ():  # before minutes are spent on reading the log
@@ -201,29 +178,38 @@ def perturb(
             runs = replayer.replay(trials)
         is_raw = bundle.path is None or bundle.path.resolve() != logs[0].resolve()
         write_runs(output, bundle, runs, keep_bundle=is_raw)
-        view, references = bundle.view(), references_of(bundle, None)
-        rows: list[dict[str, Any]] = [
-            {
-                "estimator": run.trial.estimator,
-                "perturbation": run.trial.perturbation,
-                "level": run.trial.level,
-                "unit": run.trial.unit,
-                "parameters": run.trial.given,
-                "not_applicable": run.not_applicable,
-                "metrics": {
-                    **trial_metrics(run, runs, bundle),
-                    **nees_metrics(asked_of(run, references, view)),
-                },
-            }
-            for run in runs
-        ]
+        told = [text for run in runs for text in (run_key(run.trial), str(run.not_applicable))]
+        rows = json.loads(
+            kept(cache_folder() / "numbers", told, lambda: json.dumps(_rows(bundle, runs)).encode())
+        )
     if as_json:
-        import json
-
         typer.echo(json.dumps({"runs": str(output), "trials": rows}, indent=1, allow_nan=False))
         return
     typer.echo(_text(rows))
     typer.echo(f"runs written to {output}", err=True)
+
+
+def _rows(bundle: Bundle, runs: Sequence[Run]) -> list[dict[str, Any]]:
+    from slamreplay.consistency.evidence.references import references_of
+    from slamreplay.replay.metrics import trial_metrics
+    from slamreplay.report.metrics import asked_of, nees_metrics
+
+    view, references = bundle.view(), references_of(bundle, None)
+    return [
+        {
+            "estimator": run.trial.estimator,
+            "perturbation": run.trial.perturbation,
+            "level": run.trial.level,
+            "unit": run.trial.unit,
+            "parameters": run.trial.given,
+            "not_applicable": run.not_applicable,
+            "metrics": {
+                **trial_metrics(run, runs, bundle),
+                **nees_metrics(asked_of(run, references, view)),
+            },
+        }
+        for run in runs
+    ]
 
 
 def _text(rows: list[dict[str, Any]]) -> str:

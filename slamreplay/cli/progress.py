@@ -5,6 +5,10 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from datetime import timedelta
+
+#: From which share done on the time left is told.
+_TOLD_FROM = 0.01
 
 #: What long-running library functions are given: a few words, and the share done from 0 to 1.
 Progress = Callable[[str, float], None]
@@ -17,9 +21,14 @@ def progress_bar(title: str) -> Iterator[Progress | None]:
         yield None
         return
     from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+    from rich.progress import BarColumn, Progress, ProgressColumn, Task, TextColumn
+    from rich.text import Text
 
-    columns = (TextColumn("{task.description}"), BarColumn(), TimeRemainingColumn())
+    class Left(ProgressColumn):
+        def render(self, task: Task) -> Text:
+            return Text(time_left(task.elapsed or 0.0, task.completed), style="progress.remaining")
+
+    columns = (TextColumn("{task.description}"), BarColumn(), Left())
     with Progress(*columns, console=Console(stderr=True), transient=True) as bars:
         task = bars.add_task(title, total=1.0)
 
@@ -27,3 +36,13 @@ def progress_bar(title: str) -> Iterator[Progress | None]:
             bars.update(task, description=what, completed=share)
 
         yield show
+
+
+def time_left(elapsed_s: float, share: float) -> str:
+    """Hours, minutes and seconds left where the share done took so long, 0 to 1.
+
+    By the whole time and not by the speed of late, for parallel work comes in at intervals.
+    """
+    if share < _TOLD_FROM:
+        return "-:--:--"
+    return f"{timedelta(seconds=round(elapsed_s * (1.0 - share) / share))} left"

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from slamreplay.bundle.run import Run
     from slamreplay.bundle.view import Bundle
     from slamreplay.ingest.options import IngestOptions
+    from slamreplay.replay.dose import DoseResults
     from slamreplay.report.evidence import Postmortem
 
 Evidence = Annotated[
@@ -126,7 +127,7 @@ def _report(
         start_s=start_s,
         end_s=end_s,
     )
-    with _evidence(logs, options) as (bundle, runs):
+    with _evidence(logs, options) as (bundle, runs, design):
         from slamreplay.cli.progress import progress_bar
         from slamreplay.postmortem import postmortem
         from slamreplay.report.build import build
@@ -144,6 +145,7 @@ def _report(
                 hold_out=hold_out or (),
                 correct_map=update_map is not None,
                 trace_ns=trace_ns,
+                design=design,
                 cause=cause,
                 progress=progress,
             )
@@ -169,8 +171,11 @@ def _propose(post: Postmortem, target: Path, original: Path | None) -> None:
 
 
 @contextmanager
-def _evidence(logs: Sequence[Path], options: IngestOptions) -> Iterator[tuple[Bundle, list[Run]]]:
+def _evidence(
+    logs: Sequence[Path], options: IngestOptions
+) -> Iterator[tuple[Bundle, list[Run], DoseResults | None]]:
     from slamreplay.ingest.options import IngestOptions
+    from slamreplay.replay.dose_file import read_doses
     from slamreplay.replay.folder import is_runs, read_runs
 
     if len(logs) == 1 and is_runs(logs[0]):
@@ -180,10 +185,10 @@ def _evidence(logs: Sequence[Path], options: IngestOptions) -> Iterator[tuple[Bu
                 where=logs[0],
                 hint="its bundle was ingested already",
             )
-        yield read_runs(logs[0])
+        yield *read_runs(logs[0]), read_doses(logs[0])
         return
     with evidence(logs, options) as bundle:
-        yield bundle, []
+        yield bundle, [], None
 
 
 def _summarise(post: Postmortem, page: Path) -> None:

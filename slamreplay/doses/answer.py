@@ -87,7 +87,8 @@ def answer(
     runs = None if cache is None else cache / "runs"
     judges = Judges(bundle, None if cache is None else cache / "hindsight", progress)
     with Replayer(bundle, cache=runs, workers=workers, watch=watch) as replayer:
-        trials = Trials(bundle, parameters, plan.seeds[0], judges, replayer)
+        numbers = None if cache is None else cache / "numbers"
+        trials = Trials(bundle, parameters, plan.seeds[0], judges, replayer, numbers)
         return _answered(bundle, plan, trials, progress)
 
 

@@ -78,6 +78,11 @@ def curve(
                 f"{limit.metric} keeps its limit again at {where} {axis.unit}{more} "
                 f"({many} of {len(each)} seeds): the first crossing is told"
             )
+    notes += [
+        f"{c.metric} is beyond its limit undisturbed: no dose can be blamed for it"
+        for c in critical
+        if c.outcome == "always"
+    ]
     refused = _refusals(trials, estimator, axis, levels, seeds)
     notes += [f"{level:.4g} {axis.unit} is not applicable: {why}" for level, why in refused.items()]
     if not is_random and len(plan.seeds) > 1:
@@ -122,8 +127,15 @@ def no_curve(trials: Trials, estimator: str, axis: Axis, reason: str) -> DoseCur
 
 
 def _first(critical: Sequence[Critical], baseline: float) -> str | None:
-    """The metric that crosses at the least level; of several there the first."""
-    reached = [(abs(c.level - baseline), c.metric) for c in critical if c.level is not None]
+    """The metric that crosses at the least level; of several there the first.
+
+    One that is beyond its limit undisturbed was broken by no dose.
+    """
+    reached = [
+        (abs(c.level - baseline), c.metric)
+        for c in critical
+        if c.outcome == "crossed" and c.level is not None
+    ]
     return min(reached, key=lambda pair: pair[0])[1] if reached else None
 
 

@@ -3,9 +3,14 @@
 from __future__ import annotations
 
 import hashlib
+import json
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
+from pathlib import Path
 
+import numpy as np
+
+from slamreplay.bundle.kept import kept
 from slamreplay.bundle.odometry import odometry_track
 from slamreplay.bundle.run import Run, Trial, run_bytes
 from slamreplay.bundle.view import Bundle
@@ -13,6 +18,7 @@ from slamreplay.consistency.evidence.source import Reference
 from slamreplay.doses.judge import BASELINE, Judges
 from slamreplay.doses.measure import Measured, measured
 from slamreplay.doses.plan import Dose
+from slamreplay.replay.run_cache import run_key
 from slamreplay.replay.runner import Replayer
 
 Progress = Callable[[str, float], None]
@@ -30,6 +36,7 @@ class Trials:
         first_seed: whose runs are kept.
         judges: of the log.
         replayer: of the log; it does every round.
+        numbers: folder in which numbers are kept from one design to the next.
     """
 
     def __init__(
@@ -39,10 +46,11 @@ class Trials:
         first_seed: int,
         judges: Judges,
         replayer: Replayer,
+        numbers: Path | None = None,
     ) -> None:
         self._bundle, self._parameters = bundle, parameters
         self._first_seed, self._judges = first_seed, judges
-        self._replayer = replayer
+        self._replayer, self._folder = replayer, numbers
         self._view = bundle.view()
         self._odometry = odometry_track(self._view)
         self._judge_of: dict[str, Reference | None] = {}
@@ -91,9 +99,16 @@ class Trials:
         known = self._runs.get(undisturbed)
         baseline = known or self._runs[self.baseline(trial.estimator, self._first_seed)]
         judge = self._judge_of.get(trial.estimator)
-        self._numbers[trial] = measured(
-            run, baseline, judge, self._bundle, self._view, self._odometry
-        )
+        self._numbers[trial] = self._measured(run, baseline, judge)
+
+    def _measured(self, run: Run, baseline: Run, judge: Reference | None) -> Measured:
+        def make() -> bytes:
+            found = measured(run, baseline, judge, self._bundle, self._view, self._odometry)
+            return json.dumps(found).encode()
+
+        folder = None if run.estimate is None else self._folder
+        told = ["numbers of a dose", run_key(run.trial), run_key(baseline.trial), _judge(judge)]
+        return dict(json.loads(kept(folder, told, make)))
 
     @property
     def known(self) -> int:
@@ -125,6 +140,18 @@ class Trials:
     def run(self, trial: Trial) -> Run:
         """A run that was kept."""
         return self._runs[trial]
+
+
+def _judge(judge: Reference | None) -> str:
+    """A judge as a hash of all that it says."""
+    if judge is None:
+        return BASELINE
+    track = judge.track
+    names = [judge.kind, judge.source, track.frame_id, track.child_frame_id]
+    digest = hashlib.sha256("\0".join(names).encode())
+    for array in (track.t_ns, track.xyyaw, track.cov):
+        digest.update(np.ascontiguousarray(array).tobytes())
+    return digest.hexdigest()
 
 
 def _digest(run: Run) -> str:

@@ -28,7 +28,7 @@ class Recorded:
 
     map->odom before the topic of poses, each from when it arrived; the covariance is the latest
     published one, NaN before the first. Nothing is estimated: it cannot be run again, so that no
-    perturbation applies to it.
+    perturbation applies to it but that of the covariance it gave out.
     """
 
     name: ClassVar[str] = "recorded"

@@ -28,6 +28,8 @@ ROTATE, SIGMA = "initial_pose_rotate_rad", "initial_pose_sigma_m"
 MOVED = frozenset({OFFSET, LEFT, ROTATE, SIGMA})
 #: and 1 for a start that knows nothing.
 GLOBAL = "initial_pose_global"
+#: Tables that a recorded belief is composed of.
+_BELIEVED = frozenset({"transforms", "odometry", "poses"})
 #: What a clicked start is told with: 15 deg where its place is told to 0.5 m.
 RAD_PER_M = np.radians(15.0) / 0.5
 
@@ -130,4 +132,6 @@ def _perturbed(start: Start, view: BundleView) -> Start:
 
 def _undisturbed(view: BundleView) -> BundleView:
     """The log as it was: odometry that is changed must not move the start as well."""
+    if _BELIEVED.isdisjoint(view.tables):
+        return view
     return BundleView(view.bundle, held_out=view.held_out, stretch=view.stretch)

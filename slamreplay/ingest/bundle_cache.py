@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pyarrow as pa
 
-import slamreplay
+from slamreplay.bundle.code_hash import code_hash
 from slamreplay.bundle.store import MANIFEST, is_bundle
 from slamreplay.bundle.view import Bundle
 from slamreplay.errors import BundleError, MapError
@@ -74,10 +74,7 @@ def made_once(cache: Path, told: Iterable[str], make: Callable[[Path], Bundle]) 
 
 
 def _key(told: Iterable[str]) -> str:
-    digest = hashlib.sha256(f"{np.__version__} {pa.__version__}\n".encode())
-    root = Path(slamreplay.__file__).parent
-    for file in sorted(root.rglob("*.py")):
-        digest.update(_line(file.relative_to(root).as_posix(), file).encode())
+    digest = hashlib.sha256(f"{code_hash()} {np.__version__} {pa.__version__}\n".encode())
     for line in told:
         digest.update(f"{line}\n".encode())
     return digest.hexdigest()[:32]

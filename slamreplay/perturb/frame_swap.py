@@ -10,6 +10,7 @@ import numpy as np
 from slamreplay.bundle.view import BundleView
 from slamreplay.errors import NotApplicableError
 from slamreplay.geometry import se2, se3
+from slamreplay.perturb.beams import scan_rows
 from slamreplay.perturb.odometry_path import with_odometry
 from slamreplay.perturb.variant import Variant, check_level, switch
 
@@ -80,11 +81,8 @@ class FrameSwap:
 
     def _mount(self, view: BundleView) -> tuple[np.ndarray, str]:
         """Rows of the scans, and their frame, which tf places on the robot."""
-        table, base = view.table("scans"), view.manifest.frames.base or ""
-        rows = np.flatnonzero(table["topic"] == view.manifest.topic_of("scan"))
-        if not len(rows):
-            raise NotApplicableError("the log has no scans", where=self.name)
-        laser = str(table["frame_id"][rows[0]])
+        rows, base = scan_rows(view, self.name), view.manifest.frames.base or ""
+        laser = str(view.table("scans")["frame_id"][rows[0]])
         if laser == base or not view.transforms.has_path(base, laser):
             raise NotApplicableError("tf does not say where the laser is mounted", where=self.name)
         return rows, laser

@@ -7,13 +7,13 @@ from typing import ClassVar
 
 import numpy as np
 
-from slamreplay.bundle.tables import Ragged
 from slamreplay.bundle.view import BundleView
-from slamreplay.errors import NotApplicableError
 from slamreplay.geometry import se2, se3
 from slamreplay.geometry.se2 import Array
 from slamreplay.geometry.times import Times
 from slamreplay.maps.grid import OccupancyGrid
+from slamreplay.perturb.beams import scan_beams
+from slamreplay.perturb.held_maps import held_maps
 from slamreplay.perturb.inertial import inertial
 from slamreplay.perturb.odometry_path import with_odometry
 from slamreplay.perturb.variant import Variant, check_level, switch
@@ -73,16 +73,10 @@ class Handedness:
         return with_odometry(view, self.name, change, twists)
 
     def _scans(self, view: BundleView) -> BundleView:
-        table = view.table("scans")
-        own = table["topic"] == view.manifest.topic_of("scan")
-        if not own.any():
-            raise NotApplicableError("the log has no scans", where=self.name)
-        ranges = table["ranges_m"]
-        entry, lengths = np.arange(len(ranges.values)), ranges.lengths
-        ends = np.repeat(ranges.offsets[:-1] + ranges.offsets[1:] - 1, lengths)
-        entry = np.where(np.repeat(own, lengths), ends - entry, entry)
-        mirrored = Ragged(ranges.values[entry], ranges.offsets)
-        return view.with_table(table.replace(ranges_m=mirrored))
+        beams = scan_beams(view, self.name)
+        ragged = beams.table["ranges_m"]
+        ends = np.repeat(ragged.offsets[:-1] + ragged.offsets[1:] - 1, ragged.lengths)
+        return beams.with_ranges(beams.ranges_m[ends - np.arange(len(ends))])
 
     def _inertial(self, view: BundleView) -> BundleView:
         unit = inertial(view, self.name)
@@ -96,10 +90,10 @@ class Handedness:
         return view.with_table(changed)
 
     def _map(self, view: BundleView) -> BundleView:
-        grid = view.grid
-        if grid is None:
-            raise NotApplicableError("the log has no map", where=self.name)
-        cells = np.ascontiguousarray(grid.cells[::-1])
-        return view.with_grid(
-            OccupancyGrid(cells, grid.resolution_m, grid.origin_xyyaw.copy(), grid.frame_id)
-        )
+        grids = held_maps(view, self.name)
+        return view.with_grids({version: _mirrored(grid) for version, grid in grids.items()})
+
+
+def _mirrored(grid: OccupancyGrid) -> OccupancyGrid:
+    cells = np.ascontiguousarray(grid.cells[::-1])
+    return OccupancyGrid(cells, grid.resolution_m, grid.origin_xyyaw, grid.frame_id)

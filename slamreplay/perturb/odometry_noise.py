@@ -8,6 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from slamreplay.bundle.view import BundleView
+from slamreplay.errors import NotApplicableError
 from slamreplay.geometry.se2 import Array
 from slamreplay.geometry.times import Times
 from slamreplay.perturb.driven import driven
@@ -39,12 +40,14 @@ class OdometryNoise:
         """The view with other odometry.
 
         Raises:
-            NotApplicableError: the log has no odometry.
+            NotApplicableError: the log has no odometry, or the robot stands all along.
             UsageError: the level is out of range.
         """
         if level == check_level(self.name, self.variants, variant, level).baseline:
             return view
         way = driven(view, self.name)
+        if way.length_m == 0.0:
+            raise NotApplicableError("the robot does not drive in this log", where=self.name)
         at_m = np.arange(int(way.length_m / _CELL_M) + 2) * _CELL_M
         drawn = rng.standard_normal(len(at_m) - 1) * np.sqrt(_CELL_M)
         gathered = np.append(0.0, np.cumsum(drawn))  # after 1 m its variance is 1

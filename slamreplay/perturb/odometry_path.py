@@ -15,6 +15,7 @@ from slamreplay.geometry import se2, se3
 from slamreplay.geometry.se2 import Array
 from slamreplay.geometry.times import Times
 from slamreplay.geometry.transforms import Edge
+from slamreplay.perturb.odometry_rows import odometry_rows
 from slamreplay.perturb.tf_delay import moving_odometry
 
 #: Times (N,) and poses (N, 3) that odometry tells, sorted, to the poses that it is to tell.
@@ -55,15 +56,11 @@ def told_odometry(view: BundleView, name: str) -> Told:
         NotApplicableError: the log has none, or tf leads from odometry to the base by way of a
             third frame, about which both move.
     """
-    table, transforms = view.table("odometry"), view.table("transforms")
-    topic = _sorted(table, table["topic"] == view.manifest.topic_of("odometry"))
-    try:
-        moving = moving_odometry(view, name)
-    except NotApplicableError:
-        if not len(topic):
-            raise NotApplicableError("the log has no odometry to change", where=name) from None
+    rows, transforms = odometry_rows(view, name), view.table("transforms")
+    topic = _sorted(view.table("odometry"), rows["odometry"])
+    if not rows["transforms"].any():
         return Told(topic, np.zeros(0, dtype=np.int64), is_upside_down=False)
-    below = _below_odometry(view)
+    moving, below = moving_odometry(view, name), _below_odometry(view)
     sides = {edge.child in below for edge in moving}
     if len(sides) > 1:
         what = "tf has no straight way from odometry to the base: both move about a third frame"

@@ -9,6 +9,7 @@ from typing import ClassVar
 import numpy as np
 
 from slamreplay.bundle.view import BundleView
+from slamreplay.errors import NotApplicableError
 from slamreplay.geometry.se2 import Array
 from slamreplay.geometry.times import NS_PER_S, Times
 from slamreplay.perturb.driven import Driven, driven, moment
@@ -53,7 +54,8 @@ class OdometrySlip:
         """The view with other odometry.
 
         Raises:
-            NotApplicableError: the log has no odometry, or the robot does not drive that far.
+            NotApplicableError: the log has no odometry, or the robot does not drive that far, or
+                does not turn.
             UsageError: the level is out of range.
         """
         if level == check_level(self.name, self.variants, variant, level).baseline:
@@ -66,6 +68,8 @@ class OdometrySlip:
             start = moment(way, _SPOT_M, rng, self.name)
             turn = float(np.radians(level))
             return with_odometry(view, self.name, *_swerving(way, start, turn))
+        if not way.yaw_in_turns_at(way.t_ns, _TURNING_RAD_S).any():
+            raise NotApplicableError("the robot does not turn in this log", where=self.name)
         return with_odometry(view, self.name, *_oversteered(way, level))
 
 

@@ -151,6 +151,8 @@ class Passers:
         seam = np.flatnonzero(middle + half >= 2.0 * np.pi / step)
         pair = np.concatenate([np.arange(len(row)), seam])
         middle = np.concatenate([middle, middle[seam] - 2.0 * np.pi / step[seam]])
+        in_turn = np.argsort(pair, kind="stable")
+        pair, middle = pair[in_turn], middle[in_turn]
         low = np.maximum(np.ceil(middle - half[pair]), 0.0).astype(np.int64)
         high = np.minimum(np.floor(middle + half[pair]), self._last_beam(row[pair]))
         start = _starts(self.beams.lengths)[self.scan[row[pair]]]

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from slamreplay.bundle.view import BundleView
 from slamreplay.errors import NotApplicableError
-from slamreplay.geometry.times import ns
+from slamreplay.perturb.lost import lost_in_a_burst
 from slamreplay.perturb.variant import Variant, check_level
 
 
@@ -61,12 +61,7 @@ class ScanDrop:
         elif variant == "nth":
             drop = _every_nth(len(rows), level)
         else:
-            t_ns = table.t_ns[rows]
-            spare = int(t_ns[-1] - t_ns[0]) - ns(level)
-            if spare < 0:
-                raise NotApplicableError(f"the log is shorter than {level:g} s", where=self.name)
-            start = t_ns[0] + int(rng.random() * spare)
-            drop = (t_ns >= start) & (t_ns < start + ns(level))
+            drop = lost_in_a_burst(table.t_ns[rows], level, rng, self.name)
         keep = np.ones(len(table), dtype=bool)
         keep[rows[drop]] = False
         return view.with_table(table.take(keep))

@@ -7,12 +7,12 @@ from typing import ClassVar
 
 import numpy as np
 
-from slamreplay.bundle.tables import Ragged
 from slamreplay.bundle.view import BundleView
 from slamreplay.errors import NotApplicableError
 from slamreplay.geometry import se2, se3
 from slamreplay.geometry.se2 import Array
 from slamreplay.geometry.times import Times
+from slamreplay.perturb.beams import scan_beams
 from slamreplay.perturb.inertial import inertial
 from slamreplay.perturb.odometry_path import with_odometry
 from slamreplay.perturb.variant import Variant, check_level, switch
@@ -84,15 +84,8 @@ class UnitError:
         return view.with_table(unit.table.replace(angular_velocity_xyz=rate))
 
     def _ranges(self, view: BundleView, ratio: float) -> BundleView:
-        table = view.table("scans")
-        own = table["topic"] == view.manifest.topic_of("scan")
-        if not own.any():
-            raise NotApplicableError("the log has no scans", where=self.name)
-        ranges = table["ranges_m"]
-        scale = np.repeat(np.where(own, ratio, 1.0), ranges.lengths).astype(np.float32)
-        return view.with_table(
-            table.replace(ranges_m=Ragged(ranges.values * scale, ranges.offsets))
-        )
+        beams = scan_beams(view, self.name)
+        return beams.with_ranges(beams.ranges_m * np.float32(ratio))
 
     def _start(self, view: BundleView, ratio: float) -> BundleView:
         table = view.table("initial_poses")

@@ -12,7 +12,8 @@ from pydantic import Field
 from slamreplay.errors import UsageError
 from slamreplay.labs.lab import Strict
 from slamreplay.labs.latency_budget.ask import Budget
-from slamreplay.recipes.validation import validated
+from slamreplay.recipes.scenario import ScenarioPart, scenario_of
+from slamreplay.recipes.validation import one_line, validated
 
 
 class BudgetFile(Strict):
@@ -21,7 +22,7 @@ class BudgetFile(Strict):
     version: Literal[1]
     question: Annotated[str, Field(min_length=1, max_length=300)]
     seed: Annotated[int, Field(ge=0, lt=2**63)]
-    scenario: str | None = None
+    scenario: ScenarioPart | None = None
     budget: Budget
 
 
@@ -32,13 +33,13 @@ class BudgetRecipe:
     Attributes:
         question: one sentence.
         seed: of replayed estimators.
-        scenario: name of the log to simulate where none is given, None without any.
+        scenario: name and seed of a simulated log; None where a log is needed.
         parameters: budgets, stages and the gate's limit.
     """
 
     question: str
     seed: int
-    scenario: str | None
+    scenario: tuple[str, int] | None
     parameters: Budget
 
 
@@ -49,17 +50,13 @@ def budget_recipe(given: Mapping[str, Any], path: Path) -> BudgetRecipe:
         UsageError: a key that there is not, or a value that makes no sense.
     """
     from slamreplay.estimators import ESTIMATORS
-    from slamreplay.simulate import SCENARIOS
 
     file = validated(BudgetFile, given, path)
-    if " ".join(file.question.split()) != file.question:
-        raise UsageError("'question' is not one line of text", where=path)
-    if file.scenario is not None and file.scenario not in SCENARIOS:
-        raise UsageError(f"there is no scenario {file.scenario[:80]!r}", where=path,
-                         hint=f"there are: {', '.join(SCENARIOS)}")  # fmt: skip
+    one_line("question", file.question, path)
     for asked in file.budget.replayed:
         try:
             ESTIMATORS.load(asked.estimator)
         except UsageError as error:
             raise UsageError(error.what, where=path, hint=error.hint) from error
-    return BudgetRecipe(file.question, file.seed, file.scenario, file.budget)
+    scenario = scenario_of(file.scenario, path)
+    return BudgetRecipe(file.question, file.seed, scenario, file.budget)

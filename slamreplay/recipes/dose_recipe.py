@@ -14,9 +14,8 @@ from slamreplay.doses.metrics import limit_of
 from slamreplay.doses.plan import MAX_TRIALS, Axis, Dose, Plan, of_levels, of_search, variant_of
 from slamreplay.errors import UsageError
 from slamreplay.estimators import ESTIMATORS
+from slamreplay.recipes.scenario import ScenarioPart, scenario_of
 from slamreplay.recipes.validation import one_line, validated
-from slamreplay.registry import nearest
-from slamreplay.simulate import SCENARIOS
 
 _Seed = Annotated[int, Field(ge=0, lt=2**63 - 1000)]
 _Number = Annotated[float, Field(allow_inf_nan=False)]
@@ -30,13 +29,6 @@ T = TypeVar("T")
 
 class _Strict(BaseModel):
     model_config = ConfigDict(extra="forbid", strict=True)
-
-
-class ScenarioPart(_Strict):
-    """A simulated log."""
-
-    name: _Name
-    seed: Annotated[int, Field(ge=0, lt=2**63)]
 
 
 class SearchPart(_Strict):
@@ -124,15 +116,6 @@ def dose_recipe(given: Mapping[str, Any], path: Path) -> DoseRecipe:
             f"'perturbations' names {twice[0][0]} twice", where=path, hint="put its levels together"
         )
     _at("estimators", path, check_estimators, file.estimators)
-    scenario = None
-    if file.scenario is not None:
-        if file.scenario.name not in SCENARIOS:
-            raise UsageError(
-                f"there is no scenario {file.scenario.name!r}",
-                where=f"{path}: 'scenario.name'",
-                hint=nearest(file.scenario.name, SCENARIOS),
-            )
-        scenario = (file.scenario.name, file.scenario.seed)
     plan = Plan(
         file.question,
         tuple(range(file.seed, file.seed + file.seeds)),
@@ -147,7 +130,7 @@ def dose_recipe(given: Mapping[str, Any], path: Path) -> DoseRecipe:
         raise UsageError(
             f"it asks for up to {plan.most_trials} trials, more than {MAX_TRIALS}", where=path
         )
-    return DoseRecipe(plan, scenario)
+    return DoseRecipe(plan, scenario_of(file.scenario, path))
 
 
 def check_estimators(names: list[str]) -> None:
@@ -157,7 +140,7 @@ def check_estimators(names: list[str]) -> None:
         UsageError: an unknown name, or one given twice.
     """
     for name in names:
-        ESTIMATORS.load(name)
+        ESTIMATORS.target(name)
     if len(set(names)) != len(names):
         raise UsageError("an estimator is named twice")
 

@@ -106,7 +106,8 @@ class DoseCurve:
         responses: by growing distance from the baseline, the baseline itself first.
         critical: one per limit, in the design's order.
         broke_first: metric whose limit is crossed at the least level, None where none is; of
-            several at one level the first in the design's order.
+            several at one level the first in the design's order. What is beyond its limit
+            undisturbed does not count.
         notes: what a reader of its numbers must know, as sentences.
         reason: why there is no curve; empty where there is one.
     """

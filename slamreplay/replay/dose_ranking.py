@@ -21,6 +21,7 @@ class Margin:
         metric: whose limit was crossed at the least level; None where all held.
         level: at which it was; None where all held.
         share: of the range from the baseline to the farthest level tried; None where all held.
+        undisturbed: metrics beyond their limits undisturbed, which therefore have no part in it.
     """
 
     estimator: str
@@ -29,6 +30,7 @@ class Margin:
     metric: str | None
     level: float | None
     share: float | None
+    undisturbed: tuple[str, ...]
 
 
 def ranking(results: DoseResults) -> tuple[Margin, ...]:
@@ -47,5 +49,6 @@ def _margin(curve: DoseCurve) -> Margin:
     level = None if first is None else first.level
     farthest = abs(curve.responses[-1].level - curve.baseline)
     share = None if level is None else abs(level - curve.baseline) / farthest
-    return Margin(curve.estimator, curve.perturbation, curve.unit,
-                  curve.broke_first, level, share)  # fmt: skip
+    already = tuple(c.metric for c in curve.critical if c.outcome == "always")
+    return Margin(curve.estimator, curve.perturbation, curve.unit, curve.broke_first, level, share,
+                  already)  # fmt: skip

@@ -73,8 +73,17 @@ class Forecast:
     def share(
         self, done: Sequence[Trial], waiting: Sequence[Trial], running: Mapping[Trial, float]
     ) -> float:
-        """Share of the work that is done, 0 to 1; of `running` as in `left_s` the part expected."""
+        """Share of the work that is done, 0 to 1.
+
+        Of `running`, as in `left_s`, the part that is expected to be; nothing of trials whose
+        estimator never ran.
+        """
+        known = self.known
         over = sum(self.seconds(trial) for trial in done)
-        part = sum(min(since, _NEARLY * self.seconds(t)) for t, since in running.items())
+        part = sum(
+            min(since, _NEARLY * self.seconds(trial))
+            for trial, since in running.items()
+            if trial.estimator in known
+        )
         total = over + sum(self.seconds(trial) for trial in (*waiting, *running))
         return (over + part) / total if total > 0.0 else 1.0

@@ -32,6 +32,9 @@ def run_trial(bundle: Bundle, trial: Trial) -> Run:
         return Run(trial, as_reported(estimator.run(view, seed=trial.seed), view.settings))
     except NotApplicableError as reason:
         return Run(trial, None, str(reason))
+    except np.linalg.LinAlgError as fault:
+        # Evidence in the wrong unit by 1e20: what broke is the filter, and the other trials go on.
+        return Run(trial, None, f"{estimator.name}: its arithmetic broke down ({fault})")
 
 
 def _refuse_recorded(trial: Trial, estimator: Any) -> None:

@@ -5,14 +5,13 @@ from __future__ import annotations
 import hashlib
 import inspect
 import json
-from functools import cache as once
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-import slamreplay
 from slamreplay.bundle.atomic import write_file
+from slamreplay.bundle.code_hash import code_hash
 from slamreplay.bundle.run import Run, Trial, read_run, run_bytes
 from slamreplay.errors import BundleError, OutputError
 from slamreplay.estimators import ESTIMATORS
@@ -25,7 +24,7 @@ _CODE = ("geometry", "maps", "matching", "graph", "bundle", "perturb", "estimato
 
 def run_file(trial: Trial, cache: Path) -> Path:
     """Where a cache keeps the run of a trial."""
-    return cache / f"{_key(trial)}.npz"
+    return cache / f"{run_key(trial)}.npz"
 
 
 def cached_run(trial: Trial, cache: Path | None) -> Run | None:
@@ -51,7 +50,7 @@ def keep_run(run: Run, cache: Path) -> bool:
     return True
 
 
-def _key(trial: Trial) -> str:
+def run_key(trial: Trial) -> str:
     """Hash of everything a run depends on: evidence, trial, configuration, code, numpy.
 
     What comes with the package is not loaded for it: its defaults are part of its code.
@@ -72,13 +71,8 @@ def _is_ours(target: str) -> bool:
     return target.startswith(tuple(f"slamreplay.{package}." for package in _CODE))
 
 
-@once
 def _code() -> str:
-    root = Path(slamreplay.__file__).parent
-    digest = hashlib.sha256()
-    for file in sorted(f for name in _CODE for f in (root / name).rglob("*.py")):
-        digest.update(file.relative_to(root).as_posix().encode() + b"\0" + file.read_bytes())
-    return digest.hexdigest()
+    return code_hash(*_CODE)
 
 
 def _source(thing: Any) -> str:

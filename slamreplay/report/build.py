@@ -8,6 +8,7 @@ from slamreplay import __version__
 from slamreplay.bundle.findings import Finding
 from slamreplay.report.assess import title_of
 from slamreplay.report.build_ledger import jump_parts, ledger_part, trace_part
+from slamreplay.report.designs import design_of, design_part
 from slamreplay.report.evidence import Postmortem, TrialResult
 from slamreplay.report.latency import latency_part
 from slamreplay.report.model import (
@@ -85,6 +86,7 @@ def build(post: Postmortem) -> Report:
         ],
         findings=[_finding(f) for f in post.findings],
         trials=[_trial(t) for t in post.trials],
+        design=design_part(design_of(post)),
         ledger=ledger_part(post),
         jumps=jump_parts(post),
         trace=trace_part(post),

@@ -22,6 +22,7 @@ from slamreplay.estimators.pose_graph.product import MapAndGraph
 from slamreplay.geometry import se2
 from slamreplay.geometry.times import seconds_since
 from slamreplay.maps.grid import OccupancyGrid
+from slamreplay.replay.dose import DoseResults
 from slamreplay.report.ledger import LedgerSet, ledger_sets
 from slamreplay.report.trace import RunTrace, trace
 from slamreplay.rootcause.result import RootCause
@@ -58,6 +59,7 @@ class Postmortem:
         nees: of the belief at its own updates, None without covariance or reference.
         consistency: the belief's covariance against every source that can tell, the best first.
         trials: perturbation trials, baseline first.
+        design: what the trials were laid out by, None where nobody did.
         recorded: the localizer of the log as runs, its ledger with what the log holds near it.
         jumps: of each run, the recorded ones first, the steps of its path and their causes.
         trace_ns: the moment around which is asked what moved the belief, None if nobody asked.
@@ -83,6 +85,7 @@ class Postmortem:
     nees: Nees | None = None
     consistency: tuple[ConsistencySummary, ...] = ()
     trials: tuple[TrialResult, ...] = ()
+    design: DoseResults | None = None
     recorded: tuple[Run, ...] = ()
     jumps: tuple[tuple[Trial, tuple[Jump, ...]], ...] = ()
     trace_ns: int | None = None

@@ -12,11 +12,14 @@ from jinja2 import Environment, StrictUndefined
 from matplotlib.figure import Figure
 
 from slamreplay.report.clean import clean
+from slamreplay.report.designs import design_of
+from slamreplay.report.dose_tables import words_of
 from slamreplay.report.evidence import Postmortem
 from slamreplay.report.figures import canvas
 from slamreplay.report.figures.consistency import consistency_figure
 from slamreplay.report.figures.course import course_figure
 from slamreplay.report.figures.covariance import covariance_figure
+from slamreplay.report.figures.doses import doses_figure
 from slamreplay.report.figures.graph import graph_figure
 from slamreplay.report.figures.map import map_figure
 from slamreplay.report.figures.reliability import reliability_figure
@@ -60,6 +63,7 @@ def _pictures(post: Postmortem, view: Page) -> dict[str, Picture | None]:
         "course": _picture(post, course_figure, canvas.WIDE, view.course_alt),
         "covariance": _picture(post, covariance_figure, canvas.WIDE, view.covariance_alt),
         "consistency": _picture(post, _consistency, canvas.WIDE, view.consistency_alt),
+        "doses": _picture(post, _doses, canvas.WIDE, view.design_alt),
         "graph": _picture(post, _graph, canvas.BESIDE, view.graph_alt),
         "reliability": _picture(post, _reliability, canvas.BESIDE, view.reliability_alt),
     }
@@ -75,6 +79,13 @@ def _picture(
 
 def _consistency(post: Postmortem, width_in: float) -> Figure | None:
     return consistency_figure(post.consistency, width_in)
+
+
+def _doses(post: Postmortem, width_in: float) -> Figure | None:
+    results = design_of(post)
+    if results is None or not any(curve.responses for curve in results.curves):
+        return None
+    return doses_figure(results, words_of(results), width_in)
 
 
 def _graph(post: Postmortem, width_in: float) -> Figure | None:

@@ -37,6 +37,8 @@ def latency_note(post: Postmortem) -> str:
     if said is None:
         text.append("No localizer corrected odometry, so that only odometry has an age.")
     elif told:
+        if not said.on_tf and post.latency.odometry is not None:
+            text.append("Its corrections are not on tf: odometry is taken to carry its poses.")
         text.append(_parts(told[0], said.dated, said.lead_s))
     return " ".join([*text, *(f"{c[0].upper()}{c[1:]}." for c in post.latency.clocks.caveats)])
 

@@ -226,6 +226,78 @@ class TrialPart(_Strict):
     metrics: dict[str, bool | Number]
 
 
+class LimitPart(_Strict):
+    """A number of a run that counts as broken beyond a value."""
+
+    metric: Text
+    at_most: float
+
+
+class CriticalPart(_Strict):
+    """The level at which one metric crosses its limit, null where it does not.
+
+    `low` to `high` hold the median over seeds with `confidence`; of a single seed it is the bracket
+    between the last level that held and the first that did not, and `confidence` is null.
+    """
+
+    metric: Text
+    outcome: Literal["crossed", "partly", "never", "always", "not_applicable"]
+    level: Number
+    low: Number
+    high: Number
+    confidence: Number
+    crossed: int
+    seeds: int
+
+
+class CurvePart(_Strict):
+    """One perturbation of one estimator; `reason` says why there is no curve."""
+
+    estimator: Text
+    perturbation: Text
+    unit: Text
+    baseline: float
+    levels: list[float]
+    critical: list[CriticalPart]
+    broke_first: str | None
+    reason: str
+
+
+class ControlPart(_Strict):
+    """A trial whose answer is known beforehand; `passed` is null where it was not applicable."""
+
+    kind: Literal["no_op", "positive"]
+    estimator: Text
+    perturbation: Text
+    level: float
+    unit: Text
+    passed: bool | None
+    text: Text
+
+
+class MarginPart(_Strict):
+    """How far a perturbation could be turned up, as a share of the range tried."""
+
+    estimator: Text
+    perturbation: Text
+    unit: Text
+    metric: str | None
+    level: Number
+    share: Number
+
+
+class DesignPart(_Strict):
+    """What was changed, how much it took and what broke first; the first limit was searched for."""
+
+    question: Text
+    judged_by: str
+    seeds: list[int]
+    limits: list[LimitPart]
+    curves: list[CurvePart]
+    controls: list[ControlPart]
+    ranking: list[MarginPart]
+
+
 class LedgerSourcePart(_Strict):
     """One source of one run's ledger: how many rows, and the one that moved the belief most.
 
@@ -340,7 +412,7 @@ class UsagePart(_Strict):
     what a correction's age is made of. `unknown_*` is how the robot moved within `pose_s`.
     """
 
-    name: Literal["controller", "planner", "recoveries"]
+    name: Literal["controller", "planner", "goals", "recoveries"]
     topic: Text | None
     uses: Ns
     rate_hz: Number
@@ -392,6 +464,7 @@ class Report(_Strict):
     actions: list[ActionPart]
     findings: list[FindingPart]
     trials: list[TrialPart]
+    design: DesignPart | None
     ledger: LedgerPart
     jumps: list[JumpPart]
     trace: TracePart | None

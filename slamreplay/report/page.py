@@ -8,7 +8,7 @@ from datetime import UTC, datetime
 from slamreplay import __version__
 from slamreplay.bundle.manifest import Manifest, MapVersion
 from slamreplay.geometry.times import NS_PER_S
-from slamreplay.report import consistency_tables, phrases, tables, trace_tables
+from slamreplay.report import consistency_tables, designs, phrases, tables, trace_tables
 from slamreplay.report.assess import not_assessable, title_of
 from slamreplay.report.cause_table import cause_note, causes
 from slamreplay.report.evidence import Postmortem
@@ -52,6 +52,12 @@ class Page:
     actions: Table
     regions: Table
     trials: Table
+    design: Table
+    design_question: str
+    ranking: Table
+    controls: Table
+    design_notes: tuple[str, ...]
+    design_alt: str
     graph_alt: str
     innovations: Table
     jumps: Table
@@ -85,7 +91,7 @@ class Page:
 
 def page(post: Postmortem) -> Page:
     """The page of a post-mortem."""
-    judgement, manifest = post.judgement, post.manifest
+    judgement, manifest, design = post.judgement, post.manifest, designs.design_of(post)
     seen = dict.fromkeys(i.state for i in judgement.intervals)
     return Page(
         version=__version__,
@@ -111,6 +117,12 @@ def page(post: Postmortem) -> Page:
         actions=tables.actions(post),
         regions=tables.regions(post),
         trials=tables.trials(post),
+        design=designs.design_table(design),
+        design_question="" if design is None else design.question,
+        ranking=designs.ranking_table(design),
+        controls=designs.control_table(design),
+        design_notes=designs.design_notes(design),
+        design_alt=designs.design_alt(design),
         graph_alt=phrases.graph_alt(post),
         innovations=innovations(post),
         jumps=trace_tables.jumps(post),

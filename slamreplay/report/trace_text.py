@@ -15,8 +15,13 @@ _JUMPS = 3
 
 
 def trace_lines(post: Postmortem) -> Iterator[str]:
-    """The grave jumps of each run, and a table for each where a moment was asked for."""
+    """The grave jumps of undisturbed runs, and a table for each where a moment was asked for.
+
+    A run that is made to break jumps all the time: that is in the report, and no news here.
+    """
     for trial, found in post.jumps:
+        if trial.perturbation is not None:
+            continue
         grave = sorted((j for j in found if j.step.is_grave), key=lambda j: -j.step.size)
         for jump in grave[:_JUMPS]:
             yield f"{run_name(trial)} jumped {sentence(jump, post.manifest.start_ns)}"

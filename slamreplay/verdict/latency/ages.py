@@ -69,7 +69,12 @@ def ages(consumer: Consumer, said: Words | None, odometry: Words | None) -> Ages
     if said is not None:
         # tf answers for the last moment that both transforms reach.
         both = np.minimum(carried, until)  # NO_STAMP is the least there is
-        read = both if said.on_tf and odometry is not None else measured
+        if odometry is None:
+            read = measured
+        elif said.on_tf:
+            read = both
+        else:  # somebody carried it, though tf is not in the log: the belief is read so, too
+            read = np.where(measured == NO_STAMP, NO_STAMP, carried)
     sensing, answering = _since(measured, heard), _since(heard, there)
     unknown = heard == NO_STAMP
     answering[unknown] = _since(measured, there)[unknown]

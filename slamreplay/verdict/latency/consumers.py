@@ -1,4 +1,4 @@
-"""Who used the pose, and when: planner, controller, recoveries; and how regularly they came round.
+"""Who used the pose, and when: controller, planner, goals, recoveries; and how regularly.
 
 Only what was done while the robot moved, or was told to, counts: a pose ages without harm while the
 robot rests, and most controllers go on sending zeros then.
@@ -19,11 +19,11 @@ from slamreplay.bundle.track import PoseTrack
 from slamreplay.bundle.view import BundleView
 from slamreplay.geometry import se2
 from slamreplay.geometry.times import NO_STAMP, NS_PER_S, Times, ns
-from slamreplay.verdict.goals import recoveries
+from slamreplay.verdict.goals import navigations, recoveries
 from slamreplay.verdict.latency.clocks import Clocks
 from slamreplay.verdict.motion import REST_M_S, REST_RAD_S, asks_for_motion
 
-Name = Literal["controller", "planner", "recoveries"]
+Name = Literal["controller", "planner", "goals", "recoveries"]
 
 #: A plan or command that is stamped so long before it was recorded was computed in that time.
 _COMPUTED_NS = 2 * NS_PER_S
@@ -42,7 +42,7 @@ class Budgets:
     planner_hz: float = 10.0
 
     def hz(self, name: Name) -> float:
-        """Of a consumer; recoveries are begun by the planner's cycle."""
+        """Of a consumer; goals and recoveries are begun by the planner's cycle."""
         return self.controller_hz if name == "controller" else self.planner_hz
 
 
@@ -66,7 +66,7 @@ class Consumer:
     """One user of the pose.
 
     Attributes:
-        name: controller, planner or recoveries.
+        name: controller, planner, goals or recoveries.
         topic: where what it made of the pose was recorded, None where nothing was.
         t_ns: (N,) when it used the pose, on the clock of the stamps, sorted.
         budget_hz: the rate it should have.
@@ -95,7 +95,7 @@ class Consumer:
 def consumers(
     view: BundleView, clocks: Clocks, moved: PoseTrack | None, budgets: Budgets
 ) -> tuple[Consumer, ...]:
-    """Controller and planner, and recoveries where there were any.
+    """Controller and planner, and goals and recoveries where there were any.
 
     A controller or planner that was not recorded is asked for as if it had run at its budget's rate
     while the robot moved.
@@ -121,11 +121,15 @@ def consumers(
             for name in names
             if name not in there
         ]
-    begun = np.array([r.t_ns for r in recoveries(view) if not r.inferred], dtype=np.int64)
-    if len(begun):
-        topic = view.manifest.topic_of("recovery") or "recoveries"
-        found.append(Consumer("recoveries", topic, begun, budgets.planner_hz))
-    order = (*names, "recoveries")
+    topic = view.manifest.topic_of("recovery") or "recoveries"
+    begun: dict[Name, list[int]] = {
+        "goals": [span.start_ns for span in navigations(view) or ()],
+        "recoveries": [r.t_ns for r in recoveries(view) if not r.inferred],
+    }
+    for name, t_ns in begun.items():
+        at = np.sort(np.array(t_ns, dtype=np.int64))
+        found.append(Consumer(name, topic, at, budgets.planner_hz))
+    order: Sequence[Name] = (*names, "goals", "recoveries")
     return tuple(sorted((c for c in found if len(c.t_ns)), key=lambda c: order.index(c.name)))
 
 

@@ -31,7 +31,7 @@ class Latency:
         said: the localizer's corrections, None where there are none that could be late.
         odometry: odometry's messages, None without any.
         track: where odometry was, None without any.
-        ages: by consumer, in the order of controller, planner, recoveries.
+        ages: by consumer, in the order of controller, planner, goals, recoveries.
         budgets: the rates that were asked for.
     """
 

@@ -135,7 +135,7 @@ def _words(
     on_tf: bool,
 ) -> Words:
     arrived = clocks.arrived_ns(stream.t_log_ns)
-    stamps = usable_stamps(stream)
+    stamps = clocks.stamped_ns(stream)
     scans = _scans(view, found)
     ahead = lead(stream, view.manifest.clock, scans) if stream.edge is not None else None
     ahead_ns = 0 if ahead is None else round(ahead.seconds * NS_PER_S)
@@ -149,6 +149,7 @@ def _words(
         of, same = _nearest(usable_stamps(scans), measured)
         if same.mean() >= _SHARE:
             dated = "scan"
+            measured = np.where(same, clocks.stamped_ns(scans)[of], measured)
             heard[same] = clocks.arrived_ns(scans.t_log_ns)[of[same]]
     if clocks.basis == "arrival":
         measured, dated = arrived, "arrival"
