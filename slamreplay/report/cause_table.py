@@ -41,5 +41,5 @@ def cause_note(post: Postmortem) -> str:
         f"start. Then one thing at a time was put back as the log has it, and a particle filter "
         f"with Nav2's defaults was run on it, {cause.trials} times in all. What leads the belief "
         "astray as it was seen is probable; the probabilities are calibrated on simulated "
-        "incidents of known cause."
+        "incidents of known cause." + (f" But {cause.reason}." if cause.reason else "")
     )

@@ -21,6 +21,9 @@ from slamreplay.verdict.judgement import FailureKind, Interval
 from slamreplay.verdict.limits import Limits
 from slamreplay.verdict.looked_at import Looked, looked_at
 
+#: What only odometry can show in a replay.
+_OF_MOTION = ("kidnapped", "odometry_slip", "optimization_drift")
+
 
 def root_cause(
     view: BundleView,
@@ -69,7 +72,10 @@ def _of(
         return _told(looked)
     incident, put_right, tried = found
     chance = weights.probabilities(tried, looked.mode.kind)
-    return _answer(incident, put_right, tried, chance)
+    answer = _answer(incident, put_right, tried, chance)
+    if np.isfinite(incident.odometry).any():
+        return answer
+    return _without_odometry(answer, looked)
 
 
 def trials_and_mode(
@@ -152,6 +158,17 @@ def _answer(
     replays = {id(replay) for one in tried for replay in one.replays if replay.by_chance}
     start, end = incident.onset_ns, int(incident.t_ns[-1])
     return RootCause(start, end, kind, min(by_kind[kind], 1.0), tuple(found), len(replays))
+
+
+def _without_odometry(answer: RootCause, looked: Looked) -> RootCause:
+    """What is left of an answer that half of the causes could not be tried for."""
+    reason = "the log has no odometry: slips, carries and drift could not be put back"
+    if answer.began_as != "none":
+        return replace(answer, reason=reason)
+    mode = looked.mode
+    kind: FailureKind = mode.kind if mode.kind in _OF_MOTION else "none"
+    sure = mode.confidence if kind != "none" else None
+    return replace(answer, began_as=kind, probability=sure, reason=reason)
 
 
 def _candidate(

@@ -17,11 +17,12 @@ def mode_of(cause: RootCause, read_off: FailureMode) -> FailureMode:
     """
     if not cause.trials:
         return read_off
-    best = next(one for one in cause.candidates if one.kind == cause.began_as)
-    if cause.began_as == "none":
+    best = next((one for one in cause.candidates if one.kind == cause.began_as), None)
+    if cause.began_as == "none" or best is None:
         if read_off.kind == "none":
             return read_off
         text = "no single thing put back into healed evidence reproduces the loss"
+        text += f" ({cause.reason})" if cause.reason else ""
         return FailureMode(read_off.kind, read_off.confidence, (*read_off.evidence, text))
     told = f"replayed: {best.text}"
     if cause.began_as == read_off.kind:
