@@ -140,7 +140,9 @@ def test_a_golden_recipe_asks_the_same(recipe):
     assert set(part.seeds) <= set(plan.seeds)
     assert set(part.estimators) <= set(plan.estimators)
     for axis in part.axes:
-        (same,) = [a for a in plan.axes if (a.perturbation, a.side) == (axis.perturbation, axis.side)]
+        (same,) = [
+            a for a in plan.axes if (a.perturbation, a.side) == (axis.perturbation, axis.side)
+        ]
         assert set(axis.levels) <= set(same.levels)
 
 
