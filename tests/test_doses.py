@@ -9,6 +9,7 @@ from slamreplay.bundle.schema import TABLES
 from slamreplay.bundle.store import write_bundle
 from slamreplay.bundle.track import PoseTrack
 from slamreplay.bundle.view import Bundle
+from slamreplay.doses import trials
 from slamreplay.doses.answer import answer
 from slamreplay.doses.carried import carried
 from slamreplay.doses.folder import write_answer
@@ -65,6 +66,24 @@ def test_levels_bracket_the_limit_and_paired_differences_are_the_dose(bundle):
     for response in curve.responses[1:]:
         found = response.paired["error_max_m"]
         assert found.mean == pytest.approx(response.level, rel=1e-3)
+
+
+def test_a_design_asked_again_measures_nothing_anew(bundle, tmp_path, monkeypatch):
+    tables = {name: bundle.table(name) for name in TABLES}
+    write_bundle(tmp_path / "b", bundle.manifest, tables, {"room": bundle.grid()})
+    there, asked = Bundle.open(tmp_path / "b"), plan(of_levels("wrong.by", [0.2, 0.8]))
+    done, fresh = [], trials.measured
+    monkeypatch.setattr(trials, "measured", lambda *a: done.append(a[0].trial) or fresh(*a))
+
+    first = answer(there, asked, cache=tmp_path / "c")
+    count = len(done)
+    again = answer(there, asked, cache=tmp_path / "c")
+
+    assert count == len(set(done)) == len(done) == first.trials
+    assert again.results == first.results
+    answer(bundle, asked, cache=tmp_path / "c")  # one in memory is nobody's that can be told
+    answer(bundle, asked, cache=tmp_path / "c")
+    assert len(done) == 3 * count
 
 
 def test_nothing_is_replayed_five_times_where_nothing_is_drawn(bundle, monkeypatch):

@@ -105,11 +105,14 @@ def perturb(
 ) -> None:
     """Run estimators on a log: each by itself, then with one perturbation at a time.
 
-    The table shows how far each run is from the undisturbed run of the same estimator. A recipe
-    that is a design says which levels of which perturbations are tried, or searches for the level
-    at which an estimator breaks; its answer lies beside the runs. One that is a budget asks how old
-    poses were in the LOG, or in the scenario it names; one that is a lab simulates what it needs
-    and takes no LOG. Both write their answer to the folder.
+    The table shows how far each run is from the undisturbed run of the same estimator. Each run is
+    kept as soon as it is done: after an interruption the same command goes on from there, and
+    inspect shows meanwhile how far it is.
+
+    A recipe that is a design says which levels of which perturbations are tried, or searches for
+    the level at which an estimator breaks; its answer lies beside the runs. One that is a budget
+    asks how old poses were in the LOG, or in the scenario it names; one that is a lab simulates
+    what it needs and takes no LOG. Both write their answer to the folder.
     """
     how = options.ingest_options(
         map_yaml=map_yaml,

@@ -50,7 +50,8 @@ class Trials:
     ) -> None:
         self._bundle, self._parameters = bundle, parameters
         self._first_seed, self._judges = first_seed, judges
-        self._replayer, self._folder = replayer, numbers
+        # A bundle in memory has no hash of its own.
+        self._replayer, self._folder = replayer, None if bundle.path is None else numbers
         self._view = bundle.view()
         self._odometry = odometry_track(self._view)
         self._judge_of: dict[str, Reference | None] = {}
