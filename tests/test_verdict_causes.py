@@ -24,6 +24,7 @@ from slamreplay.replay.runner import run_trial
 from slamreplay.testing.synthetic import START_NS, synthetic_bundle, true_path
 from slamreplay.verdict.actions import Outcome, actions, risky
 from slamreplay.verdict.belief_error import belief_error
+from slamreplay.verdict.case import Case
 from slamreplay.verdict.confidence import calibrated, confidence
 from slamreplay.verdict.contract import contract_findings
 from slamreplay.verdict.judge import judge
@@ -31,7 +32,7 @@ from slamreplay.verdict.limits import Limits
 from slamreplay.verdict.map_frame import constant_offset
 from slamreplay.verdict.scan_gaps import scan_gaps
 from slamreplay.verdict.summary import MOST_CHARACTERS
-from slamreplay.verdict.timing import scan_delay
+from slamreplay.verdict.timing import Delay, scan_delay
 from slamreplay.verdict.wander import is_pulled_back
 from slamreplay.verdict.wheels import Wheels, wheels
 
@@ -262,6 +263,22 @@ def test_a_first_pose_that_is_as_vague_as_it_was_told_is_no_wrong_one(sigma_m, k
     away = PoseTrack("map", "base_link", belief.t_ns, off, cov)
 
     assert judge(bundle.view(), away, hindsight_of(bundle)).failure_mode.kind == kind
+
+
+@pytest.mark.parametrize(("off_m", "late_s", "is_so"), [(0.6, 0.8, True), (2.0, 0.8, False),
+                                                        (0.6, 0.1, False)])  # fmt: skip
+def test_an_error_that_clocks_make_is_no_wrong_start(off_m, late_s, is_so):
+    bundle = synthetic_bundle(seconds=5)
+    t = (at_scans(bundle) - START_NS) / 1e9
+    off = true_path(t) + np.array([off_m, 0.0, 0.0])
+    belief = PoseTrack.without_covariance("map", "base_link", at_scans(bundle), off)
+    hindsight = hindsight_of(bundle)
+    error = belief_error(belief, hindsight, LIMITS)
+    nothing = np.full(len(t), np.nan)
+    delay = Delay(late_s, 0.01, 5, "scans")
+    case = Case(bundle.view(), error, hindsight, (), nothing, LIMITS, delay)
+
+    assert case.is_made_by_delay(3) is is_so
 
 
 @pytest.mark.parametrize(

@@ -23,6 +23,8 @@ RESET_NS = 5 * NS_PER_S
 #: An episode that lasts this long is more than a filter that settles.
 LASTING_NS = 10 * NS_PER_S
 
+#: What a robot that drives among people does at most.
+FASTEST_M_S, FASTEST_RAD_S = 1.5, 1.0
 #: A cause, how sure it is (0 to 1, None where it is no cause), and the sentences that show it.
 Answer = tuple[FailureKind, float | None, list[str]]
 
@@ -88,6 +90,18 @@ class Case:
         late_ns = ns(delay.seconds) if delay is not None and delay.is_significant else 0
         told = odometry.at(self.error.t_ns - late_ns).xyyaw
         return told if self.wheels is None else self.wheels.mended(told)
+
+    def is_made_by_delay(self, row: int) -> bool:
+        """Whether a row's error is no larger than what a robot drives and turns within the delay.
+
+        With clocks that disagree a right belief is off by that, and so is a wrong one at first.
+        """
+        delay = self.delay
+        if delay is None or not delay.is_significant:
+            return False
+        late_s = abs(delay.seconds)
+        near = self.error.distance_m[row] <= FASTEST_M_S * late_s
+        return bool(near and self.error.heading_rad[row] <= FASTEST_RAD_S * late_s)
 
     def resets(self, onset: int) -> se2.Array:
         """Times of the poses that somebody set around the time at which the belief went wrong."""

@@ -46,6 +46,8 @@ def from_the_start(case: Case, lost: Interval, onset: int) -> Answer | None:
     if onset - first > START_NS and causes_motion.moved_otherwise(case, onset) is not None:
         return None  # nothing is known of its first moments, and something else of later ones
     at = int(np.clip(np.searchsorted(error.t_ns, onset), 0, len(error.t_ns) - 1))
+    if case.is_made_by_delay(at):
+        return None
     metres, radians = error.distance_m[at], error.heading_rad[at]
     beyond = max(metres / case.limits.position_m, radians / case.limits.yaw_rad)
     far = f"{metres:.2f} m and {np.degrees(radians):.0f} deg"
@@ -88,7 +90,8 @@ def _told_vaguely(case: Case, row: int) -> float | None:
 def was_set(case: Case, onset: int) -> Answer | None:
     """Somebody set a pose, and it was a wrong one."""
     resets, error = case.resets(onset), case.error
-    if not len(resets):
+    at = int(np.clip(np.searchsorted(error.t_ns, onset), 0, len(error.t_ns) - 1))
+    if not len(resets) or case.is_made_by_delay(at):
         return None
     # What was right for a second after somebody set it went wrong by something else.
     after = error.known & (error.t_ns > resets[0]) & (error.t_ns <= resets[0] + NS_PER_S)
