@@ -79,6 +79,32 @@ def test_without_odometry_a_wrong_start_is_still_found():
     assert "no odometry" in slip.reason
 
 
+def test_a_wrong_pose_that_somebody_set_on_the_way_is_found():
+    view, belief, found = log_of("wheel_slip", 601)
+    rows = np.flatnonzero(belief.t_ns >= belief.t_ns[0] + 8_000_000_000)
+    xyyaw = found.track.xyyaw.copy()
+    wrong = xyyaw[rows] + np.array([0.0, 2.5, 0.0])
+    xyyaw[rows] = wrong
+    table = view.table("initial_poses")
+    position, angle = np.array([[*wrong[0, :2], 0.0]]), wrong[0, 2] / 2.0
+    t_ns = belief.t_ns[rows[:1]]
+    late = table.take([0]).replace(
+        t_ns=t_ns,
+        t_log_ns=t_ns + (table["t_log_ns"][0] - table.t_ns[0]),
+        position_xyz=position,
+        orientation_xyzw=np.array([[0.0, 0.0, np.sin(angle), np.cos(angle)]]),
+    )
+    set_late = view.with_table(Table.concat(table.schema, [table, late]))
+    said = PoseTrack("map", "base_link", belief.t_ns, xyyaw, belief.cov)
+
+    cause = root_cause(set_late, said, found)
+
+    assert cause.began_as == "wrong_initial_pose"
+    best = cause.candidates[0]
+    assert best.level == pytest.approx(2.5, abs=0.2)
+    assert "the pose that was set at" in best.text
+
+
 def test_the_same_log_gives_the_same_answer():
     log = log_of("too_sure", 600)
 

@@ -67,7 +67,7 @@ def starts(
         NotApplicableError: the first start is to be moved, and there is none.
     """
     rows = np.flatnonzero(np.isfinite(T_odom_base).all(axis=1))
-    found = _given(view, t_ns, T_odom_base, rows)
+    found = given(view, t_ns, T_odom_base)
     belief = recorded_belief(_undisturbed(view), t_ns[rows]) if told is None else None
     if told is not None and len(rows) and (not found or rows[0] < found[0].row):
         found.insert(0, Start(int(rows[0]), *told))
@@ -84,12 +84,9 @@ def starts(
     return found
 
 
-def _given(
-    view: BundleView,
-    t_ns: NDArray[np.int64],
-    T_odom_base: se2.Array,
-    rows: NDArray[np.int64],
-) -> list[Start]:
+def given(view: BundleView, t_ns: NDArray[np.int64], T_odom_base: se2.Array) -> list[Start]:
+    """Every initial pose in the log, in order of the rows from which on it held; see `starts`."""
+    rows = np.flatnonzero(np.isfinite(T_odom_base).all(axis=1))
     table = view.role("initial_pose")
     if table is None:
         return []

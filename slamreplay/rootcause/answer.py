@@ -73,9 +73,7 @@ def _of(
     incident, put_right, tried = found
     chance = weights.probabilities(tried, looked.mode.kind)
     answer = _answer(incident, put_right, tried, chance)
-    if np.isfinite(incident.odometry).any():
-        return answer
-    return _without_odometry(answer, looked)
+    return answer if incident.has_odometry else _without_odometry(answer, looked)
 
 
 def trials_and_mode(

@@ -88,7 +88,7 @@ def slips_of(incident: Incident, steps: se2.Array) -> tuple[Slip, ...]:
         steps: (N - 1, 3) odometry's steps between rows.
     """
     rows = _knots(incident.t_ns, incident.known & np.isfinite(incident.where).all(axis=1))
-    if len(rows) < 2 or not np.isfinite(steps).all():
+    if len(rows) < 2 or not incident.has_odometry:
         return ()
     made = se2.between(incident.where[rows[:-1]], incident.where[rows[1:]])
     told = np.array([_over(steps, a, b) for a, b in pairwise(rows.tolist())])

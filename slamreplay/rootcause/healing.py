@@ -16,11 +16,14 @@ from slamreplay.rootcause.beams import Rows, beams_of, cleared
 from slamreplay.rootcause.doses import Slip, calibrated, healed_steps, slips_of
 from slamreplay.rootcause.first_pose import right_start
 from slamreplay.rootcause.incident import Incident
+from slamreplay.rootcause.likelihood import moments
 from slamreplay.rootcause.replays import Evidence
 from slamreplay.rootcause.tracks import filled, put_together, steps_of
 
 #: Map beyond the way that the laser may reach and particles may stray to, m.
 _AROUND_M = 15.0
+#: Moments that have to be known for a replay to be compared with what was seen.
+_FEWEST = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,10 +66,10 @@ class Healed:
 def healed(incident: Incident, config: AmclConfig) -> Healed | None:
     """The log of an incident put right; None without map or scans, or where hindsight is silent."""
     grid, scans = incident.view.grid, scan_set(incident.view)
-    if grid is None or scans is None or not incident.known.any():
+    if grid is None or scans is None or len(moments(incident)) < _FEWEST:
         return None
     truth = filled(incident.t_ns, incident.where, incident.odometry)
-    mended = calibrated(incident.odometry, incident.case.wheels)
+    mended = healed_steps(calibrated(incident.odometry, incident.case.wheels), (), truth)
     slips = slips_of(incident, mended)
     steps = healed_steps(mended, slips, truth)
     told = healed_steps(steps_of(incident.odometry), (), truth)

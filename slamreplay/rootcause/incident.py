@@ -57,6 +57,11 @@ class Incident:
         """The log."""
         return self.case.view
 
+    @property
+    def has_odometry(self) -> bool:
+        """Whether there is enough of it for what it did to be put back."""
+        return bool(np.isfinite(self.odometry).all(axis=1).mean() > 0.5)
+
     def row_at(self, t_ns: int) -> int:
         """The first row at or after a time; the last one beyond the end."""
         return min(int(np.searchsorted(self.t_ns, t_ns)), len(self.t_ns) - 1)

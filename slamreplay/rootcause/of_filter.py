@@ -44,7 +44,7 @@ def trusts(incident: Incident, healed: Healed) -> Iterator[Trial]:
 
 def uncorrected(incident: Incident, healed: Healed) -> Iterator[Trial]:
     """Nothing that takes errors of motion out."""
-    if not np.isfinite(incident.odometry).all():
+    if not incident.has_odometry:
         return
     blind = tuple(None if one is None else _nothing(one) for one in healed.evidence.beams)
     odometry = healed.odometry_of(healed.told_steps)

@@ -7,7 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from slamreplay.estimators.start import given
 from slamreplay.geometry import se2
+from slamreplay.geometry.times import NS_PER_S
 from slamreplay.rootcause.doses import Slip
 from slamreplay.rootcause.first_pose import START_COV, WIDE_M, first_told, wider
 from slamreplay.rootcause.healing import Healed
@@ -20,6 +22,8 @@ from slamreplay.rootcause.words import apart
 _MISTAKE_M, SEEDS = 3.0, 6
 #: A dose alone never says more than this, in nats: it may be there and do no harm.
 _MOST = 8.0
+#: A pose that is set so long after the belief left the truth still has to do with it.
+_SOON_NS = NS_PER_S
 
 
 def starts(incident: Incident, healed: Healed) -> Iterator[Trial]:
@@ -44,6 +48,30 @@ def starts(incident: Incident, healed: Healed) -> Iterator[Trial]:
                 log_dose=max(wrong, -_MOST), seeds=SEEDS)  # fmt: skip
 
 
+def set_poses(incident: Incident, healed: Healed) -> Iterator[Trial]:
+    """Poses that somebody set on the way, the one most off."""
+    odometry = healed.evidence.odometry
+    set_again = [s for s in given(incident.view, incident.t_ns, odometry) if s.row > 0]
+    set_again = [s for s in set_again if incident.t_ns[s.row] <= incident.onset_ns + _SOON_NS]
+    found = []
+    for one in set_again:
+        if one.xyyaw is not None:
+            off = one.xyyaw - healed.truth[one.row]
+            off[2] = se2.wrap_angle(off[2])
+            sizes = float(np.hypot(off[0], off[1])), float(abs(off[2]))
+            found.append((*sizes, off, (one.row, one.xyyaw, one.cov)))
+    if not found:
+        return
+    metres, turn, off, pose = max(found, key=lambda f: f[0] + f[1])
+    odds = min(_mistaken(metres, turn) - _honest(off, START_COV), _MOST)
+    told = replace(healed.evidence, set_again=(pose,))
+    row = pose[0]
+    since = incident.case.seconds(int(incident.t_ns[row]))
+    words = f"the pose that was set at {since}, {apart(metres, turn)} off"
+    yield Trial("initial_pose.offset", "wrong_initial_pose", metres, "m", row, words, told,
+                log_dose=max(odds, -_MOST))  # fmt: skip
+
+
 def _honest(off: se2.Array, cov: se2.Array) -> float:
     """Log density of an offset (3,) of a pose that is known as well as that."""
     white = np.linalg.solve(np.linalg.cholesky(cov), off)
@@ -59,7 +87,7 @@ def _mistaken(metres: float, turn: float) -> float:
 
 def motions(incident: Incident, healed: Healed) -> Iterator[Trial]:
     """Odometry as it was recorded, where it slipped, where it was carried, and all along."""
-    if not np.isfinite(incident.odometry).all():
+    if not incident.has_odometry:
         return
     if healed.slips:
         yield from _slipped(incident, healed)

@@ -51,6 +51,7 @@ def _trials(
     incident: Incident, put_right: Healed, offset: ConstantOffset | None
 ) -> Iterator[Trial]:
     yield from of_motion.starts(incident, put_right)
+    yield from of_motion.set_poses(incident, put_right)
     yield from of_motion.motions(incident, put_right)
     yield from of_sensing.clocks(incident, put_right)
     yield from of_sensing.gaps(incident, put_right)
