@@ -405,6 +405,18 @@ FINDINGS: dict[str, Explanation] = {
         "(hindsight), and of the turn it invents per metre of straight way.",
         "A floor that slips everywhere is no different from a wrong wheel diameter.",
     ),
+    "SR-ODO-003": Explanation(
+        "Motion is told in another unit or hand",
+        "Do odometry, gyroscope and commands tell the same turns and the same way?",
+        "Rates over the steps of odometry: medians of odometry over gyroscope, odometry over "
+        "command and gyroscope over command, of steps in which the divisor turns by more than "
+        "0.15 rad/s or drives more than 0.1 m/s, 25 steps or more. Told are ratios within a "
+        "quarter of -1 (hands), 180/pi and its inverse (degrees), 1000 and its inverse "
+        "(millimetres). Where a third witness agrees with one of the two, the other is named.",
+        "An IMU that hangs upside down turns the other way round: it is asked only where tf says "
+        "how it hangs. Commands that were not followed leave their ratio to chance. Places that "
+        "are mirrored while headings are not, and mirrored scans, are not seen.",
+    ),
     "SR-ACT-001": Explanation(
         "An action the uncertainty did not allow",
         "Did 3 standard deviations of the position fit between the robot and the nearest obstacle?",

@@ -16,6 +16,7 @@ CHECKS = Registry(
         "lasers": "slamreplay.consistency.audits.lasers:check",
         "losses": "slamreplay.consistency.audits.completeness:check_losses",
         "missing": "slamreplay.consistency.audits.completeness:check_missing",
+        "motion_units": "slamreplay.consistency.audits.motion_units:check",
         "nees": "slamreplay.consistency.belief.credibility:check",
         "nis": "slamreplay.consistency.innovations.nis:check",
         "numbers": "slamreplay.consistency.audits.numbers:check",
@@ -38,6 +39,7 @@ AUDITS = (
     "covariance",
     "numbers",
     "lasers",
+    "motion_units",
 )
 
 #: The checks that concern a belief, whoever holds it: runs of estimators are asked them too.
