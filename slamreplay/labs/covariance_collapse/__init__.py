@@ -1,0 +1,1 @@
+"""Process noise told too low: a tight covariance, a growing error, and who finds it."""
