@@ -10,12 +10,14 @@ LABS = Registry(
     "lab",
     {
         "covariance_breathing": "slamreplay.labs.covariance_breathing.lab:CovarianceBreathing",
+        "covariance_collapse": "slamreplay.labs.covariance_collapse.lab:CovarianceCollapse",
         "false_closures": "slamreplay.labs.false_closures.lab:FalseClosures",
         "interval_calibration": "slamreplay.labs.interval_calibration.lab:IntervalCalibration",
         "joint_estimation": "slamreplay.labs.joint_estimation.lab:JointEstimation",
         "lost_or_changed": "slamreplay.labs.lost_or_changed.lab:LostOrChanged",
         "minimum_replay": "slamreplay.labs.minimum_replay.lab:MinimumReplay",
         "two_run": "slamreplay.labs.two_run.lab:TwoRun",
+        "units_and_handedness": "slamreplay.labs.units_and_handedness.lab:UnitsAndHandedness",
         "wheel_slip": "slamreplay.labs.wheel_slip.lab:WheelSlip",
     },
 )

@@ -7,9 +7,14 @@ from typing import Any, Literal, NamedTuple
 
 from slamreplay.labs.lab import LabResults, ResultTable
 from slamreplay.labs.minimum_replay.questions import QUESTIONS, Answer
-from slamreplay.report.figures.minimum_replay import Cell, minimum_replay_figure
+from slamreplay.report.figures.matrix import Cell, matrix_figure
 
 Kept = Literal["same", "other", "none"]
+_LEGEND = {
+    "same": "the same answer as with all eight parts",
+    "other": "another answer",
+    "none": "no answer",
+}
 _SIGN = {"same": "", "other": " (other)", "none": ""}
 
 
@@ -64,7 +69,7 @@ def results(rows: Sequence[Row], verdicts: Mapping[str, str]) -> LabResults:
         numbers={"logs": numbers},
         tables=tables,
         notes=notes,
-        figures={"minimum_replay": lambda: minimum_replay_figure(_matrices(kept, titles))},
+        figures={"minimum_replay": lambda: matrix_figure(_matrices(kept, titles), _LEGEND)},
     )
 
 
@@ -96,7 +101,7 @@ def _matrices(
     """By title of the log and by part the cells of a row, in the order of the questions."""
     return {
         title: {
-            row.part or "nothing": [
+            f"no {row.part}" if row.part else "all eight": [
                 Cell(name, row.answers[name].text or "no answer", how[name]) for name in QUESTIONS
             ]
             for row, how in kept
