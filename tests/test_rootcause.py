@@ -70,7 +70,10 @@ def test_an_incident_is_traced_to_its_cause(kind, seed, began_as):
 
 
 def test_nothing_is_asked_where_nothing_failed():
-    assert root_cause(*log_of("healthy", 600)) is None
+    view, belief, found = log_of("wheel_slip", 601)
+    right = PoseTrack("map", "base_link", belief.t_ns, found.track.xyyaw.copy(), belief.cov)
+
+    assert root_cause(view, right, found) is None
 
 
 def test_without_odometry_a_wrong_start_is_still_found():
