@@ -45,13 +45,10 @@ def test_the_page_ranks_what_was_tried(post):
     assert f"{post.root_cause.trials} times in all" in cause_note(post)
 
 
-def test_nothing_is_replayed_where_nobody_asks(post):
-    plain = postmortem(
-        synthetic_bundle(seconds=20.0, belief_offset_xyyaw=(1.5, 0.5, 0.1), offset_from_s=8.0),
-        cause=False,
-    )
+def test_nothing_is_replayed_where_nobody_asks(post, monkeypatch):
+    monkeypatch.setattr("slamreplay.postmortem.root_cause", None)  # to call it would fail
+    plain = postmortem(synthetic_bundle(seconds=4.0), cause=False)
 
-    assert plain.root_cause is None
     assert build(plain).root_cause is None
     assert "What it began with" not in html(plain)
 
