@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
+from slamreplay.cli.columns import in_columns
 from slamreplay.errors import UsageError
 
 if TYPE_CHECKING:
@@ -16,7 +17,6 @@ if TYPE_CHECKING:
     from slamreplay.ingest.options import IngestOptions
     from slamreplay.recipes import DoseRecipe
     from slamreplay.replay.dose import DoseResults
-    from slamreplay.report.dose_tables import Rows
 
 
 def run_design(
@@ -110,18 +110,10 @@ def _told(results: DoseResults, log: Mapping[str, Any], trials: int) -> str:
     scenario = log["scenario"]
     of = f"scenario {scenario['name']}, seed {scenario['seed']}; " if scenario else ""
     lines = [results.question, "", *failed, *([""] if failed else [])]
-    lines += [f"critical level: {results.limits[0].title}", _text(critical_rows(results)), ""]
-    lines += ["what breaks first:", _text(ranking_rows(results)), ""]
+    lines += [f"critical level: {results.limits[0].title}", in_columns(critical_rows(results)), ""]
+    lines += ["what breaks first:", in_columns(ranking_rows(results)), ""]
     first, *others = results.seeds
     seeds = f"seeds {first} to {others[-1]}" if others else f"seed {first}"
     lines += [f"({of}{trials} trials, {seeds})"]
     lines += [f"note: {note}" for note in notes(results) if note not in failed]
     return "\n".join(lines)
-
-
-def _text(rows: Rows) -> str:
-    widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
-    return "\n".join(
-        "  ".join(f"{cell:<{width}}" for cell, width in zip(row, widths, strict=True)).rstrip()
-        for row in rows
-    )

@@ -87,16 +87,7 @@ def _grid(title: str, *columns: str) -> Table:
 
     table = Table(title=title, title_justify="left", box=box.SIMPLE_HEAD)
     for column in columns:
-        right = column in (
-            "messages",
-            "Hz",
-            "count",
-            "rows",
-            "median s",
-            "p95 s",
-            "drift ppm",
-            "gaps",
-        )
+        right = column in _RIGHT
         name = column in ("role", "topic", "table", "what", "id")
         table.add_column(
             column, justify="right" if right else "left", overflow="fold", no_wrap=name

@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
+from slamreplay.cli.columns import in_columns
+
 if TYPE_CHECKING:
     from slamreplay.bundle.run import Run
     from slamreplay.bundle.view import Bundle
@@ -119,16 +121,9 @@ def show_runs(answers: dict[str, Any], *, as_json: bool) -> None:
     head = ["estimator", "perturbation", "level", "seed", *["state"] * with_state]
     lines = [[*head, *(title for title, _, _ in columns)]]
     lines += [_line(row, columns, with_state=with_state) for row in rows]
-    widths = [max(len(line[k]) for line in lines if k < len(line)) for k in range(len(lines[0]))]
-    left_aligned = len(head)
-    reasons = ["", *(row["not_applicable"] or "" for row in rows)]
-    for line, reason in zip(lines, reasons, strict=True):
-        cells = [
-            cell.ljust(width) if k < left_aligned else cell.rjust(width)
-            for k, (cell, width) in enumerate(zip(line, widths, strict=False))
-        ]
-        cells += [f"not applicable: {reason}"] if reason else []
-        typer.echo("  ".join(cells).rstrip())
+    reasons = [row["not_applicable"] for row in rows]
+    ends = ["", *(f"not applicable: {reason}" if reason else "" for reason in reasons)]
+    typer.echo(in_columns(lines, words=len(head), ends=ends))
 
 
 def _line(

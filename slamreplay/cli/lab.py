@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
+from slamreplay.cli.columns import in_columns
 from slamreplay.errors import UsageError
 
 if TYPE_CHECKING:
@@ -78,8 +79,4 @@ def show(head: dict[str, Any], results: LabResults, output: Path, *, as_json: bo
 def _text(table: ResultTable) -> str:
     columns = [k for k, name in enumerate(table.head) if name in (table.brief or table.head)]
     lines = [[row[k] for k in columns] for row in (table.head, *table.rows)]
-    widths = [max(len(line[k]) for line in lines) for k in range(len(columns))]
-    return "\n".join(
-        "  ".join(f"{cell:<{width}}" for cell, width in zip(line, widths, strict=True)).rstrip()
-        for line in lines
-    )
+    return in_columns(lines)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from slamreplay.cli import options
+from slamreplay.cli.columns import in_columns
 from slamreplay.errors import UsageError
 
 if TYPE_CHECKING:
@@ -231,15 +232,7 @@ def _text(rows: list[dict[str, Any]]) -> str:
         line += [] if reason else [_number(row["metrics"], key) for _, key in columns]
         lines.append(line)
         reasons.append(f"not applicable: {reason}" if reason else "")
-    widths = [max(len(line[k]) for line in lines if k < len(line)) for k in range(len(lines[0]))]
-    return "\n".join(
-        "  ".join(
-            [*(cell.ljust(width) for cell, width in zip(line[:3], widths[:3], strict=True)),
-             *(cell.rjust(width) for cell, width in zip(line[3:], widths[3:], strict=False)),
-             reason]
-        ).rstrip()
-        for line, reason in zip(lines, reasons, strict=True)
-    )  # fmt: skip
+    return in_columns(lines, words=3, ends=reasons)
 
 
 def _number(metrics: Metrics, key: str) -> str:
