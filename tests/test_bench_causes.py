@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from slamreplay.bench.cause_fit import Played, record_of, said
 from slamreplay.bench.cause_runner import cause_or_failed, causes_of
 from slamreplay.bench.cause_scores import cause_scores, wilson
 from slamreplay.bench.cause_table import causes_page
@@ -21,6 +22,7 @@ from slamreplay.cli import bench
 from slamreplay.cli.main import app
 from slamreplay.errors import UsageError
 from slamreplay.report.figures.confusion import confusion_figure
+from slamreplay.rootcause.calibration import Calibration
 from slamreplay.simulate.drive import Carry, Follow, Pause, Slip, drive
 from slamreplay.simulate.people import Companion
 from slamreplay.simulate.recording import record
@@ -353,3 +355,27 @@ def test_bench_causes_names_draws_and_goes_on_where_it_was(tmp_path, monkeypatch
     assert "rules.accuracy" in second.output
     unknown = CliRunner().invoke(app, [*args[:-2], "--by", "nobody", "-o", str(tmp_path / "d")])
     assert isinstance(unknown.exception, UsageError)
+
+
+def handmade(seed, right, wrong_rule=False):
+    """An incident whose right answer has the greater likelihood, and an offset to be learnt."""
+    other = "timing" if right == "odometry_slip" else "odometry_slip"
+    return Played(
+        seed,
+        (right,),
+        other if wrong_rule else right,
+        ((f"{right} x", right, -2.0), (f"{other} x", other, -9.0), ("none", "none", -4.0)),
+    )
+
+
+def test_the_fit_makes_right_answers_likely_and_is_judged_on_what_it_did_not_see():
+    cases = [handmade(k, ("odometry_slip", "timing")[k % 2], k % 5 == 0) for k in range(20)]
+
+    record = record_of(cases)
+    weights = Calibration(record["slope"], record["bias"], record["rule"])
+
+    assert record["cross_validated"]["right"] == 20
+    assert record["cross_validated"]["interval"][0] > 0.8
+    assert all(said(weights, case)[0] in case.accepted for case in cases)
+    assert said(weights, cases[1])[1] > said(Calibration(0.0), cases[1])[1] + 0.3
+    assert record == record_of(cases)

@@ -5,13 +5,14 @@ each trial of an incident is a choice with a score, the log likelihood times a s
 a trial is worth by itself, and the chosen ones are those whose kind is a right answer. Small
 samples must not run away: slope and offsets are drawn to a prior.
 
-`python -m slamreplay.bench.cause_fit` plays the incidents and writes the record that
-`slamreplay.rootcause.calibration` ships with.
+`python -m slamreplay.bench.cause_fit SEED...` plays every kind of incident with these seeds and
+prints the record that `slamreplay.rootcause.calibration` ships with.
 """
 
 from __future__ import annotations
 
 import json
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -19,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from slamreplay.bench.cause_scores import wilson
-from slamreplay.bench.incidents import incident
+from slamreplay.bench.incidents import ALL_KINDS, incident
 from slamreplay.bench.known_cause import known_cause
 from slamreplay.bench.logs import bundle_of
 from slamreplay.bench.schedule import Case
@@ -136,3 +137,7 @@ def main(seeds: Sequence[int], kinds: Sequence[str]) -> str:
     cases = [played(Case(kind, seed)) for seed in seeds for kind in kinds]
     record = record_of([c for c in cases if c is not None])
     return json.dumps(record, indent=1, sort_keys=True) + "\n"
+
+
+if __name__ == "__main__":
+    print(main([int(text) for text in sys.argv[1:]], ALL_KINDS), end="")  # noqa: T201
