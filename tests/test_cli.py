@@ -107,3 +107,13 @@ def test_missing_log(tmp_path):
 
     assert "gone.mcap" in text
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("name", ["a" * 300, "loop", "/dev/null"])
+@pytest.mark.parametrize("command", [["inspect"], ["report", "-o", "out"]])
+def test_a_name_that_no_log_can_have(tmp_path, name, command):
+    (tmp_path / "loop").symlink_to("loop")
+
+    text = says_one_line(run(*command, name, cwd=tmp_path))
+
+    assert name in text

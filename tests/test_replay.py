@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from slamreplay.bundle.run import Run, Trial, run_bytes
+from slamreplay.bundle.run import Run, Trial, read_run, run_bytes
 from slamreplay.bundle.schema import TABLES
 from slamreplay.bundle.store import write_bundle
 from slamreplay.bundle.view import Bundle
@@ -200,6 +200,22 @@ def test_a_folder_can_hold_its_bundle_and_be_written_again(bundle, tmp_path):
 
     assert len(read_runs(tmp_path / "moved")[0].table("scans")) == 80
     assert json.loads((tmp_path / "moved" / "runs.json").read_text())["bundle"] == "bundle"
+
+
+def test_a_run_cut_short_anywhere_is_refused_and_one_in_the_cache_made_again(bundle, tmp_path):
+    cache = tmp_path / "cache"
+    trial = design(bundle, ["dead_reckoning"], [], 0)
+    (run,) = runner.replay(bundle, trial, cache=cache)
+    (file,) = cache.glob("*.npz")
+    whole = file.read_bytes()
+
+    for size in (*range(8), *range(8, len(whole), len(whole) // 20)):
+        file.write_bytes(whole[:size])
+        with pytest.raises(BundleError, match="not a readable run"):
+            read_run(file)
+
+    (again,) = runner.replay(bundle, trial, cache=cache)
+    assert run_bytes(again) == run_bytes(run) == file.read_bytes()
 
 
 def test_damaged_and_foreign_folders_are_refused(bundle, tmp_path):

@@ -5,6 +5,9 @@ from __future__ import annotations
 import hashlib
 import io
 import json
+import tokenize
+import zipfile
+import zlib
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -174,6 +177,13 @@ def run_bytes(run: Run) -> bytes:
     return sink.getvalue()
 
 
+#: What a file that was cut short, or has a wrong byte somewhere, makes numpy and zipfile raise.
+_DAMAGED = (
+    OSError, EOFError, ValueError, LookupError, TypeError, AttributeError, NotImplementedError,
+    RuntimeError, MemoryError, tokenize.TokenError, zipfile.BadZipFile, zlib.error,
+)  # fmt: skip
+
+
 def read_run(path: Path) -> Run:
     """A run from its file.
 
@@ -181,7 +191,8 @@ def read_run(path: Path) -> Run:
         BundleError: unreadable, or written by another version.
     """
     try:
-        with np.load(path, allow_pickle=False) as arrays:
+        # Not by its name: numpy leaves a file open that it cannot read.
+        with np.load(io.BytesIO(path.read_bytes()), allow_pickle=False) as arrays:
             head = json.loads(arrays["head"].tobytes())
             if head["run_format"] != RUN_FORMAT:
                 raise BundleError(
@@ -203,7 +214,7 @@ def read_run(path: Path) -> Run:
                 if name.startswith("diagnostic.")
             }
             scalars = {str(k): float(v) for k, v in head["scalars"].items()}
-    except (OSError, ValueError, LookupError, TypeError, AttributeError) as error:
+    except _DAMAGED as error:
         raise BundleError("not a readable run", where=path) from error
     estimate = Estimate(track, innovations, diagnostics, scalars)
     return Run(trial, estimate, head["not_applicable"])

@@ -122,7 +122,10 @@ def write_bundle(
 
 def is_bundle(path: Path) -> bool:
     """Whether `path` is a folder with a bundle's manifest."""
-    return (path / MANIFEST).is_file() and (path / "tables").is_dir()
+    try:
+        return (path / MANIFEST).is_file() and (path / "tables").is_dir()
+    except OSError:  # a name that no folder can have
+        return False
 
 
 def read_manifest(path: Path) -> Manifest:

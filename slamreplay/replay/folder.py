@@ -68,7 +68,10 @@ def write_runs(
 
 def is_runs(path: Path) -> bool:
     """Whether `path` is a RUNS folder."""
-    return (path / RUNS).is_file()
+    try:
+        return (path / RUNS).is_file()
+    except OSError:  # a name that no folder can have
+        return False
 
 
 def read_runs(path: Path) -> tuple[Bundle, list[Run]]:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
@@ -158,7 +159,8 @@ def look(folder: Path, output: Path) -> Watched | None:
 
 
 def _file(folder: Path, output: Path) -> Path:
-    name = hashlib.sha256(str(output.resolve()).encode()).hexdigest()[:32]
+    place = os.path.realpath(output)  # unlike Path.resolve it bears a link that leads to itself
+    name = hashlib.sha256(os.fsencode(place)).hexdigest()[:32]
     return folder / f"{name}.json"
 
 

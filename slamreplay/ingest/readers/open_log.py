@@ -60,6 +60,8 @@ def _files(path: Path, losses: list[Loss]) -> list[Path]:
         return [path]
     if not path.exists():
         raise LogError("no such file or folder", where=path)
+    if not path.is_dir():
+        raise LogError("neither a file nor a folder", where=path)
     meta = _metadata(path / "metadata.yaml")
     told = meta.get("relative_file_paths")
     listed = [str(name) for name in told] if isinstance(told, list) else []

@@ -22,14 +22,18 @@ def text_log(path: Path) -> Callable[[Path, str | None], TextLog] | None:
     """What reads a path (given the robot's name), or None where it is no text log.
 
     Raises:
-        LogError: one file of an MRCLAM folder.
+        LogError: one file of an MRCLAM folder, or a name that no file can have.
     """
     from slamreplay.ingest.text_logs.carmen import read_carmen
     from slamreplay.ingest.text_logs.carmen_lines import is_carmen
     from slamreplay.ingest.text_logs.lines import head_of
     from slamreplay.ingest.text_logs.mrclam import read_mrclam, robots_of
 
-    if path.is_dir():
+    try:
+        is_folder = path.is_dir()
+    except OSError as error:
+        raise LogError(f"cannot read it: {error.strerror}", where=path) from error
+    if is_folder:
         return read_mrclam if robots_of(path) else None
     head = head_of(path)
     if head.startswith(b"# UTIAS Multi-Robot"):
