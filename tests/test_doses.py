@@ -1,6 +1,7 @@
 """A design whose answer is known: an estimator that is wrong by what it is told."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -263,6 +264,19 @@ def test_usual_positive_controls_are_tried_until_one_breaks(bundle):
     assert (positive.perturbation, positive.level, positive.passed) == (
         "initial_pose.offset", 20.0, True
     )  # fmt: skip
+
+
+def test_a_positive_control_that_is_told_of_was_run(bundle, monkeypatch):
+    ran, fresh = [], runner.run_trial
+    monkeypatch.setattr(runner, "run_trial", lambda b, t: ran.append(t) or fresh(b, t))
+    one = plan(of_levels("wrong.by", [1.0]), estimators=["scattered"],
+               limits=[("error_max_m", 0.05)])  # fmt: skip
+
+    found = answer(bundle, replace(one, positive_control=None))
+
+    (positive,) = [c for c in found.results.controls if c.kind == "positive"]
+    assert "beyond its limit undisturbed" in positive.text
+    assert (positive.perturbation, positive.level) in {(t.perturbation, t.level) for t in ran}
 
 
 def test_another_frame_falls_back_to_the_own_baseline_and_says_so(bundle):

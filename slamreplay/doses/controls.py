@@ -42,10 +42,9 @@ def positive_doses(plan: Plan) -> tuple[Dose, ...]:
 def next_positive(trials: Trials, plan: Plan, estimator: str) -> Dose | None:
     """The positive control that is still to be tried, None where the answer is known."""
     for dose in positive_doses(plan):
-        numbers = trials.numbers(trials.dosed(estimator, plan.seeds[0], dose))
-        if numbers is None:
+        if trials.numbers(trials.dosed(estimator, plan.seeds[0], dose)) is None:
             return dose
-        if crossed(numbers, plan.limits):
+        if _newly_crossed(trials, plan, estimator, dose):
             return None
     return None
 
@@ -64,14 +63,12 @@ def no_op(trials: Trials, plan: Plan, estimator: str, axis: Axis) -> Control:
 
 def positive(trials: Trials, plan: Plan, estimator: str) -> Control:
     """What became of the trials that are known to break a run; one of them is to."""
-    baseline = trials.numbers(trials.baseline(estimator, plan.seeds[0])) or {}
-    broken_already = crossed(baseline, plan.limits)
+    broken_already = _broken_already(trials, plan, estimator)
     doses = positive_doses(plan)
     reasons = {d: trials.reason(trials.dosed(estimator, plan.seeds[0], d)) for d in doses}
     tried = [dose for dose in doses if not reasons[dose]]
     for dose in tried:
-        numbers = trials.numbers(trials.dosed(estimator, plan.seeds[0], dose)) or {}
-        fresh = [one for one in crossed(numbers, plan.limits) if one not in broken_already]
+        fresh = _newly_crossed(trials, plan, estimator, dose)
         if fresh:
             return _told(estimator, dose, f"crosses {fresh[0].metric}", passed=True)
     if not tried:
@@ -80,6 +77,19 @@ def positive(trials: Trials, plan: Plan, estimator: str) -> Control:
         already = f"shows nothing: {broken_already[0].metric} is beyond its limit undisturbed"
         return _told(estimator, tried[-1], already, passed=False)
     return _told(estimator, tried[-1], _BLIND, passed=False)
+
+
+def _broken_already(trials: Trials, plan: Plan, estimator: str) -> list[Limit]:
+    """Limits that the undisturbed run of the first seed is beyond."""
+    baseline = trials.numbers(trials.baseline(estimator, plan.seeds[0])) or {}
+    return crossed(baseline, plan.limits)
+
+
+def _newly_crossed(trials: Trials, plan: Plan, estimator: str, dose: Dose) -> list[Limit]:
+    """Limits that a dose broke: what was broken without it shows nothing."""
+    numbers = trials.numbers(trials.dosed(estimator, plan.seeds[0], dose)) or {}
+    already = _broken_already(trials, plan, estimator)
+    return [limit for limit in crossed(numbers, plan.limits) if limit not in already]
 
 
 def _told(estimator: str, dose: Dose, text: str, *, passed: bool | None) -> Control:
