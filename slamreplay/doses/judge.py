@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-import slamreplay
 from slamreplay.bundle.atomic import write_file
+from slamreplay.bundle.code_hash import code_hash
 from slamreplay.bundle.run import Estimate, Run, Trial, read_run, run_bytes
 from slamreplay.bundle.schema import JUDGING_KINDS
 from slamreplay.bundle.track import PoseTrack
@@ -90,7 +90,9 @@ def looked_back(
     trial = Trial(bundle.manifest.bundle_id, "hindsight", 0)
     file = None
     if cache is not None and bundle.path is not None:
-        key = hashlib.sha256(f"{trial.record}\0{_code()}\0{np.__version__}".encode()).hexdigest()
+        key = hashlib.sha256(
+            f"{trial.record}\0{code_hash(*_CODE)}\0{np.__version__}".encode()
+        ).hexdigest()
         file = cache / f"{key}.npz"
         with suppress(BundleError):  # not there, damaged, or of an older version
             kept = read_run(file).estimate
@@ -103,11 +105,3 @@ def looked_back(
             file.parent.mkdir(parents=True, exist_ok=True)
             write_file(file, run_bytes(Run(trial, None if track is None else Estimate(track))))
     return track
-
-
-def _code() -> str:
-    root = Path(slamreplay.__file__).parent
-    digest = hashlib.sha256()
-    for file in sorted(f for name in _CODE for f in (root / name).rglob("*.py")):
-        digest.update(file.relative_to(root).as_posix().encode() + b"\0" + file.read_bytes())
-    return digest.hexdigest()
