@@ -43,7 +43,7 @@ class Forecast:
     def longest_first(self, trials: Iterable[Trial]) -> list[Trial]:
         """Trials in the order in which to begin them: then all cores end at about the same time.
 
-        Of estimators that were never seen one trial each goes first. (Largest processing time
+        Of estimators that were never seen one trial each goes first. (Longest processing time
         first ends at most a third later than the best order: Graham, SIAM J. Appl. Math. 17, 1969.)
         """
         order = {trial: place for place, trial in enumerate(trials)}

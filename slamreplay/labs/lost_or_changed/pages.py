@@ -34,6 +34,11 @@ _IS = {
     "lost": ("lost", "lost_and_map_changed"),
     "map_changed": ("map_changed", "lost_and_map_changed"),
 }
+#: Who says what state a trial is in.
+_SAYS: dict[str, Callable[[Trial], str]] = {
+    "verdict": lambda t: t.state,
+    "truth": lambda t: t.true_state,
+}
 Bracket = list[float | None]
 
 
@@ -89,21 +94,27 @@ _SHORT = {
 def _flips(trials: Sequence[Trial], what: str) -> dict[str, dict[str, Bracket]]:
     """By state, by who says it: the levels between which it flips, and how many logs did."""
     return {
-        state: {
-            "verdict": _bracket(trials, what, lambda t, on=on: t.state in on),  # type: ignore[misc]
-            "truth": _bracket(trials, what, lambda t, on=on: t.true_state in on),  # type: ignore[misc]
-        }
+        state: {who: _bracket(trials, what, says, on) for who, says in _SAYS.items()}
         for state, on in _IS.items()
     }
 
 
-def _bracket(trials: Sequence[Trial], what: str, holds: Callable[[Trial], bool]) -> Bracket:
-    """Over the logs: the least last level that did not flip, the greatest first one that did, n."""
+def _bracket(
+    trials: Sequence[Trial], what: str, says: Callable[[Trial], str], on: Sequence[str]
+) -> Bracket:
+    """Over the logs: the least last level that did not flip, the greatest first one that did, n.
+
+    Args:
+        trials: of all worlds.
+        what: the difference.
+        says: the state of a trial.
+        on: states that count as flipped.
+    """
     last, first = [], []
     for log in sorted({t.log for t in trials}):
         course = sorted((t for t in trials if t.log == log and t.what in ("", what)),
                         key=lambda t: t.level)  # fmt: skip
-        said = [holds(t) for t in course]
+        said = [says(t) in on for t in course]
         if any(said):
             k = said.index(True)
             first.append(course[k].level)

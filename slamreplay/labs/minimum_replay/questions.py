@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -40,7 +41,8 @@ class Answer:
             return False
         if len(self.numbers) != len(other.numbers):
             return False
-        return bool(np.allclose(self.numbers, other.numbers, rtol=_SAME, atol=1e-9))
+        pairs = zip(self.numbers, other.numbers, strict=True)
+        return all(math.isclose(a, b, rel_tol=_SAME, abs_tol=1e-9) for a, b in pairs)
 
 
 NONE = Answer()
