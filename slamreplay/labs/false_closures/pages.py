@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from matplotlib.figure import Figure
 
+from slamreplay.labs.digits import four_digits
 from slamreplay.labs.false_closures.trials import FALSE_M, FALSE_RAD, Trial
 from slamreplay.labs.intervals import share_interval
 from slamreplay.labs.lab import LabResults, ResultTable
@@ -59,7 +60,7 @@ def results(
     ]
     numbers = {
         "logs": logs,
-        "odometry_end_error_m": {k: [_four(v) for v in sorted(e)] for k, e in ends.items()},
+        "odometry_end_error_m": {k: [four_digits(v) for v in sorted(e)] for k, e in ends.items()},
         "verdicts": [
             {"corridor": corridor, "checked": checked, **verdicts[corridor, checked]}
             for corridor, checked in cases
@@ -81,11 +82,11 @@ def _summary(trials: Sequence[Trial]) -> dict[str, Any]:
         "false": sum(t.false for t in trials),
         "left_on": sum(t.left_on for t in trials),
         "logs_with_false": hit,
-        "logs_with_false_share": [_four(v) for v in share_interval(hit, len(trials))],
-        "best_false_score": _four(max(t.best_false for t in trials)),
-        "median_error_m": _four(float(np.median([t.median_m for t in trials]))),
-        "largest_error_m": [_four(v) for v in _spread(trials)],
-        "end_error_m": _four(float(np.median([t.end_m for t in trials]))),
+        "logs_with_false_share": [four_digits(v) for v in share_interval(hit, len(trials))],
+        "best_false_score": four_digits(max(t.best_false for t in trials)),
+        "median_error_m": four_digits(float(np.median([t.median_m for t in trials]))),
+        "largest_error_m": [four_digits(v) for v in _spread(trials)],
+        "end_error_m": four_digits(float(np.median([t.end_m for t in trials]))),
     }
 
 
@@ -115,9 +116,9 @@ def _verdict(
         "none_false_from": clean[0] if clean else None,
         "false_at_textbook": sum(t.false for t in of[textbook]),
         "logs_with_false_at_textbook": sum(t.false > 0 for t in of[textbook]),
-        "best_false_score": _four(max(t.best_false for t in every)),
-        "largest_error_with_kernel_m": _four(max(kernel)),
-        "largest_error_m": _four(max(t.largest_m for t in every)),
+        "best_false_score": four_digits(max(t.best_false for t in every)),
+        "largest_error_with_kernel_m": four_digits(max(kernel)),
+        "largest_error_m": four_digits(max(t.largest_m for t in every)),
     }
 
 
@@ -176,10 +177,6 @@ def _notes(textbook: float) -> list[str]:
             f"over the logs, least to most. The textbook's score is {textbook:g}."
         ),
     ]
-
-
-def _four(value: float) -> float:
-    return float(f"{value:.4g}")
 
 
 def _figure(

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from slamreplay.geometry.times import NS_PER_S
+from slamreplay.labs.digits import four_digits
 from slamreplay.labs.latency_budget.answer import Answer, Staged
 from slamreplay.labs.latency_budget.gate import WAYS, GateAtStage, GateCurve, Way
 from slamreplay.labs.latency_budget.replayed import Checked
@@ -121,11 +122,11 @@ def _check(check: Checked) -> dict[str, Any]:
 
 
 def _rounded(value: Any) -> Any:
-    """Four digits: what lies beyond is of no use, and differs between machines."""
+    """The same with four digits, and None for what is not finite."""
     if isinstance(value, dict):
         return {key: _rounded(inner) for key, inner in value.items()}
     if isinstance(value, list | tuple):
         return [_rounded(inner) for inner in value]
     if isinstance(value, float):
-        return float(f"{value:.4g}") if np.isfinite(value) else None
+        return four_digits(value) if np.isfinite(value) else None
     return value

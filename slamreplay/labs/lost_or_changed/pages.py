@@ -8,6 +8,7 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
+from slamreplay.labs.digits import four_digits
 from slamreplay.labs.lab import LabResults, ResultTable
 from slamreplay.labs.lost_or_changed.drive import FAR_START_M
 from slamreplay.labs.lost_or_changed.parting import parting
@@ -202,7 +203,7 @@ def _told(area: Sequence[float | None]) -> tuple[str, str]:
 
 
 def _four(value: float | None) -> float | None:
-    return None if value is None else float(f"{value:.4g}")
+    return None if value is None else four_digits(value)
 
 
 def _figure(trials: Sequence[Trial], areas: Mapping[str, Sequence[float | None]]) -> Figure:

@@ -8,6 +8,7 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
+from slamreplay.labs.digits import four_digits
 from slamreplay.labs.intervals import median_interval, share_interval
 from slamreplay.labs.lab import LabResults, ResultTable
 from slamreplay.labs.two_run.rules import Rules
@@ -66,10 +67,10 @@ def _summary(run: Sequence[Course]) -> dict[str, Any]:
         "credible_from_s": _finite(median_interval(from_s)),
         "never_credible": sum(c.credible_s is None for c in run),
         "wrong_for_s": _finite(median_interval([c.wrong_s for c in run])),
-        "longest_wrong_until_s": _four(max(c.wrong_until_s for c in run)),
-        "collapsed_share": [_four(v) for v in (collapsed / len(run),
+        "longest_wrong_until_s": four_digits(max(c.wrong_until_s for c in run)),
+        "collapsed_share": [four_digits(v) for v in (collapsed / len(run),
                                                *share_interval(collapsed, len(run)))],
-        "longest_collapse_s": _four(max(c.collapsed_s for c in run)),
+        "longest_collapse_s": four_digits(max(c.collapsed_s for c in run)),
         "motions_before_credible": len(waiting),
         "blocked_before_credible": sum(not m.allowed for m in waiting),
         "deceived_before_credible": sum(m.deceived for m in waiting),
@@ -81,16 +82,16 @@ def _summary(run: Sequence[Course]) -> dict[str, Any]:
 
 def _numbers(course: Course) -> dict[str, Any]:
     return {
-        "credible_from_s": None if course.credible_s is None else _four(course.credible_s),
-        "wrong_for_s": _four(course.wrong_s),
-        "wrong_until_s": _four(course.wrong_until_s),
-        "collapsed_for_s": _four(course.collapsed_s),
+        "credible_from_s": None if course.credible_s is None else four_digits(course.credible_s),
+        "wrong_for_s": four_digits(course.wrong_s),
+        "wrong_until_s": four_digits(course.wrong_until_s),
+        "collapsed_for_s": four_digits(course.collapsed_s),
         "motions": [
             {
-                "t_s": _four(m.t_s),
-                "sigma_m": _four(m.sigma_m),
-                "clearance_m": _four(m.clearance_m),
-                "error_m": _four(m.error_m),
+                "t_s": four_digits(m.t_s),
+                "sigma_m": four_digits(m.sigma_m),
+                "clearance_m": four_digits(m.clearance_m),
+                "error_m": four_digits(m.error_m),
                 "allowed": m.allowed,
             }
             for m in course.motions
@@ -157,11 +158,7 @@ def _with_interval(values: Sequence[float | None]) -> str:
 
 
 def _finite(values: tuple[float, float, float]) -> list[float | None]:
-    return [_four(v) if math.isfinite(v) else None for v in values]
-
-
-def _four(value: float) -> float:
-    return float(f"{value:.4g}")
+    return [four_digits(v) if math.isfinite(v) else None for v in values]
 
 
 def _figure(courses: Mapping[str, Sequence[Course]]) -> Figure:

@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from slamreplay.geometry.se2 import Array
+from slamreplay.labs.digits import four_digits
 from slamreplay.labs.lab import LabResults, ResultTable
 from slamreplay.labs.wheel_slip.trials import SIGMAS, Course
 from slamreplay.report.figures.wheel_slip import Panel, wheel_slip_figure
@@ -58,8 +59,8 @@ def results(
     ]
     numbers = {
         "logs": logs,
-        "slip_from_s": _four(slip_s[0]),
-        "slip_to_s": _four(slip_s[1]),
+        "slip_from_s": four_digits(slip_s[0]),
+        "slip_to_s": four_digits(slip_s[1]),
         "estimators": found,
     }
     notes = [
@@ -83,7 +84,7 @@ def _summary(pairs: Sequence[Pair], slip_s: tuple[float, float]) -> dict[str, An
 
     def over(value: Callable[[Pair], float]) -> list[float]:
         values = [value(pair) for pair in pairs]
-        return [_four(v) for v in (float(np.median(values)), min(values), max(values))]
+        return [four_digits(v) for v in (float(np.median(values)), min(values), max(values))]
 
     out: dict[str, Any] = {
         "sigma_before_m": over(lambda p: p.slipped.sigma_at(first)),
@@ -111,7 +112,7 @@ def _summary(pairs: Sequence[Pair], slip_s: tuple[float, float]) -> dict[str, An
 
 
 def _spread(values: Sequence[float]) -> list[float]:
-    return [_four(v) for v in (float(np.median(values)), min(values), max(values))]
+    return [four_digits(v) for v in (float(np.median(values)), min(values), max(values))]
 
 
 def _row(name: str, numbers: Mapping[str, Any]) -> tuple[str, ...]:
@@ -125,10 +126,6 @@ def _told(values: Sequence[float]) -> str:
     middle, low, high = values
     digits = 2 if high >= 0.1 else 3
     return f"{middle:.{digits}f} ({low:.{digits}f} to {high:.{digits}f})"
-
-
-def _four(value: float) -> float:
-    return float(f"{value:.4g}")
 
 
 def _figure(
