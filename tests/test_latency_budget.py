@@ -210,6 +210,8 @@ HOSTILE = {
     "no delay": (TEXT.replace("scan_delay.stamp", "odometry_scale.distance"), "perturbation' is"),
     "ratio": (TEXT.replace("still_allowed_ratio: 0.9", "still_allowed_ratio: 90"), "is 90"),
     "question": (TEXT.replace("question: Does", "question: ''  # "), "'question' is ''"),
+    "two lines": (TEXT.replace("name: place recognition", 'name: "a\\nb"'), "one line of text"),
+    "cells": (TEXT.replace("name: place recognition", 'name: "a | b"'), "one line of text"),
     "nan": (TEXT.replace("lever_m: 1.0", "lever_m: .nan"), "'budget.lever_m' is nan"),
 }  # fmt: skip
 

@@ -4,15 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
-from pydantic import BaseModel, ConfigDict
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 #: What `run` is given: a few words, and the share done from 0 to 1.
 Progress = Callable[[str, float], None]
+
+
+def _one_line(text: str) -> str:
+    if " ".join(text.split()) != text or "|" in text:
+        raise ValueError("should be one line of text without |")
+    return text
+
+
+#: A name that a recipe gives to a thing of its own: a cell of a table.
+GivenName = Annotated[str, Field(min_length=1, max_length=60), AfterValidator(_one_line)]
 
 
 class Strict(BaseModel):

@@ -7,7 +7,7 @@ from typing import Annotated
 from pydantic import Field, field_validator
 
 from slamreplay.errors import UsageError
-from slamreplay.labs.lab import Strict
+from slamreplay.labs.lab import GivenName, Strict
 
 Seconds = Annotated[float, Field(ge=0.001, le=10.0)]
 Hertz = Annotated[float, Field(ge=0.1, le=1000.0)]
@@ -16,7 +16,7 @@ Hertz = Annotated[float, Field(ge=0.1, le=1000.0)]
 class Stage(Strict):
     """One more stage in front of the localizer's answer."""
 
-    name: Annotated[str, Field(min_length=1, max_length=60)]
+    name: GivenName
     stage_s: Seconds
 
 

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from slamreplay.estimators.amcl.config import AmclConfig
-from slamreplay.labs.lab import Lab, LabResults, Progress, Strict
+from slamreplay.labs.lab import GivenName, Lab, LabResults, Progress, Strict
 from slamreplay.labs.two_run.hall import drive_out, evidence_of
 from slamreplay.labs.two_run.pages import results
 from slamreplay.labs.two_run.rules import Rules
@@ -19,7 +19,7 @@ Particles = Annotated[int, Field(ge=10, le=100_000)]
 class Start(Strict):
     """One run: its name, where the filter starts, and its particles under nav2_amcl's names."""
 
-    name: Annotated[str, Field(min_length=1, max_length=60)]
+    name: GivenName
     start: Literal["clicked", "anywhere"]
     min_particles: Particles
     max_particles: Particles
