@@ -1,6 +1,7 @@
 """`slamreplay perturb --recipe` with a design: on a log, on a scenario, and with nonsense."""
 
 import json
+from pathlib import Path
 
 import pytest
 import typer
@@ -14,6 +15,7 @@ from slamreplay.replay.dose_file import read_doses
 from slamreplay.replay.folder import read_runs
 from slamreplay.testing.synthetic import synthetic_bundle
 
+RECIPES = Path(__file__).parent.parent / "recipes"
 DESIGN = """\
 version: 1
 question: How many scans can go missing?
@@ -104,6 +106,18 @@ def test_a_scenario_stands_for_the_log_and_its_bundle_is_kept(recipe, tmp_path):
 )
 def test_nonsense_is_refused_before_anything_is_run(bundle, recipe, tmp_path, arguments, says):
     ran = call(bundle, "--recipe", recipe, "-o", tmp_path / "R", *arguments)
+
+    assert isinstance(ran.exception, UsageError)
+    assert says in str(ran.exception)
+    assert not (tmp_path / "R").exists()
+
+
+@pytest.mark.parametrize("name", ["latency-budget", "wheel-slip", None])
+@pytest.mark.parametrize(("seed", "says"), [(-1, "negative"), (2**62, "too large")])
+def test_every_kind_of_question_refuses_the_same_seeds(bundle, tmp_path, name, seed, says):
+    asked = [bundle] if name is None else ["--recipe", RECIPES / name / "recipe.yaml"]
+
+    ran = call(*asked, "-o", tmp_path / "R", "--seed", seed)
 
     assert isinstance(ran.exception, UsageError)
     assert says in str(ran.exception)

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from slamreplay.cli.options import checked_seed
 from slamreplay.errors import UsageError
 
 if TYPE_CHECKING:
@@ -40,7 +41,7 @@ def run_budget(
         UsageError: neither log nor scenario, or an option that has no meaning here.
     """
     from slamreplay.cli.lab import show
-    from slamreplay.cli.main import cache_folder
+    from slamreplay.cli.main import run_folder
     from slamreplay.cli.progress import progress_bar
     from slamreplay.cli.scenario import log_or_scenario
     from slamreplay.labs.folder import check_results_target, write_results
@@ -48,13 +49,11 @@ def run_budget(
 
     if given:
         raise UsageError(f"a budget takes no {', '.join(given)}", where=path, hint="leave it out")
-    if seed is not None and seed < 0:
-        raise UsageError(f"seed {seed} is negative")
-    seed = recipe.seed if seed is None else seed
+    seed = recipe.seed if seed is None else checked_seed(seed)
     check_results_target(output)
     with log_or_scenario(logs, recipe.scenario, options, path) as bundle:
         with progress_bar("replaying") as progress:
-            found = answer(bundle, recipe.parameters, seed, progress, cache_folder() / "runs")
+            found = answer(bundle, recipe.parameters, seed, progress, run_folder())
         head = {
             "question": recipe.question,
             "log": [source.name for source in bundle.manifest.sources],

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from slamreplay.cli.columns import in_columns
-from slamreplay.errors import UsageError
+from slamreplay.cli.options import checked_seed
 
 if TYPE_CHECKING:
     from slamreplay.doses.plan import Plan
@@ -91,11 +91,8 @@ def _overridden(plan: Plan, estimators: Sequence[str], seed: int | None) -> Plan
     from slamreplay.recipes.dose_recipe import check_estimators
 
     if seed is not None:
-        if not 0 <= seed < 2**62:
-            raise UsageError(
-                f"seed {seed} is negative" if seed < 0 else f"seed {seed} is too large"
-            )
-        plan = replace(plan, seeds=tuple(range(seed, seed + len(plan.seeds))))
+        first = checked_seed(seed)
+        plan = replace(plan, seeds=tuple(range(first, first + len(plan.seeds))))
     if estimators:
         check_estimators(list(estimators))
         plan = replace(plan, estimators=tuple(estimators))

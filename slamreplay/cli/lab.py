@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from slamreplay.cli.columns import in_columns
+from slamreplay.cli.options import checked_seed
 from slamreplay.errors import UsageError
 
 if TYPE_CHECKING:
@@ -47,9 +48,7 @@ def run_lab(
             where=path,
             hint="leave it out",
         )
-    if seed is not None and seed < 0:
-        raise UsageError(f"seed {seed} is negative")
-    seed = recipe.seed if seed is None else seed
+    seed = recipe.seed if seed is None else checked_seed(seed)
     check_results_target(output)
     with progress_bar("simulating") as progress:
         results = recipe.parameters.run(seed, progress)

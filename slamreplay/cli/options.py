@@ -52,8 +52,22 @@ End = Annotated[
     float | None,
     typer.Option("--end", metavar="S", help="Leave out what is later, in s from the start."),
 ]
+#: Seeds from here on leave no room for those of several trials in 64 bits.
+SEED_END = 2**62
+
 Seed = Annotated[int, typer.Option("--seed", help="Seed of every random number.")]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON on stdout.")]
+
+
+def checked_seed(seed: int) -> int:
+    """The same seed.
+
+    Raises:
+        UsageError: no generator takes it.
+    """
+    if not 0 <= seed < SEED_END:
+        raise UsageError(f"seed {seed} is {'negative' if seed < 0 else 'too large'}")
+    return seed
 
 
 def ingest_options(

@@ -160,6 +160,7 @@ def perturb(
     from slamreplay.replay.runner import Replayer
     from slamreplay.replay.watch import watched
 
+    first_seed = options.checked_seed(seed or 0)
     check_target(output, RUNS)
     for text in perturbations or ():  # before minutes are spent on reading the log
         parse_perturbation(text)
@@ -174,7 +175,7 @@ def perturb(
         options.evidence(logs, how, cache=bundle_folder()) as bundle,
     ):
         names = estimators or usual_estimators(bundle)
-        trials = design(bundle, names, perturbations or (), seed or 0, given.of)
+        trials = design(bundle, names, perturbations or (), first_seed, given.of)
         with (
             progress_bar("replaying") as progress,
             Replayer(bundle, progress=progress, cache=run_folder(), watch=watch) as replayer,
