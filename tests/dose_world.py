@@ -76,6 +76,7 @@ class Wrong:
         "hump": Variant("m", 0.0, "off by this much, but for more than 5 m", 0, 100),
         "blind": Variant("m", 0.0, "no pose from 3 m on", 0, 100),
         "short": Variant("s", 0.0, "not for this log from 3 s on", 0, 100),
+        "unsure": Variant("m", 0.0, "off by this much, some seeds not from 1 m on", 0, 100),
         "leaky": Variant("m", 0.0, "off by this much and a bit", 0, 100),
     }
     touches: ClassVar[frozenset[str]] = frozenset({OFF})
@@ -88,6 +89,8 @@ class Wrong:
             return view
         if variant == "short" and level >= 3.0:
             raise NotApplicableError("the log is too short")
+        if variant == "unsure" and level >= 1.0 and rng.random() < 0.5:
+            raise NotApplicableError("this seed refuses")
         if variant == "blind":
             return view.with_setting(BLIND, float(level >= 3.0))
         off = {
@@ -96,5 +99,6 @@ class Wrong:
             "drawn": level * (1.0 + rng.random()) if variant == "drawn" else 0.0,
             "hump": level if level <= 5.0 else 0.0,
             "short": level,
+            "unsure": level,
         }[variant]
         return view.with_setting(OFF, off)

@@ -24,7 +24,8 @@ from slamreplay.replay import runner
 from slamreplay.replay.dose_file import read_doses
 from slamreplay.replay.dose_ranking import ranking
 from slamreplay.replay.folder import read_runs
-from slamreplay.report.dose_tables import critical_rows, notes
+from slamreplay.report.dose_tables import critical_rows, notes, ranking_rows
+from slamreplay.report.figures.doses import doses_figure
 from slamreplay.testing.synthetic import synthetic_bundle
 
 
@@ -120,6 +121,16 @@ def test_what_is_drawn_is_replayed_over_the_seeds(bundle, estimator, variant):
     assert critical.crossed == critical.seeds == 5
 
 
+def test_one_baseline_stands_for_those_of_all_seeds(bundle):
+    """The first two show that nothing is drawn undisturbed; the others are not replayed."""
+    curve = only(
+        answer(bundle, plan(of_levels("wrong.drawn", [3.0]), limits=[("baseline_max_m", 1)]))
+    )
+
+    assert None not in curve.responses[1].values["baseline_max_m"]
+    assert curve.critical[0].crossed == 5
+
+
 def test_pairs_share_the_seed(bundle):
     """The scatter of the seeds is in both runs and drops out."""
     axis = of_levels("wrong.by", [1.0])
@@ -167,11 +178,12 @@ def test_a_response_that_turns_back_is_told(bundle):
 
 
 def test_no_pose_at_all_is_broken(bundle):
-    limits = [("lost_s", 1.0), ("unposed_share", 0.5)]
+    limits = [("lost_s", 1.0), ("unposed_share", 0.5), ("ate_aligned_m", 0.5), ("relations_m", 1.0)]
 
     curve = only(answer(bundle, plan(of_levels("wrong.blind", [1.0, 4.0]), limits=limits)))
 
-    assert [c.level for c in curve.critical] == [4.0, 4.0]
+    assert [c.level for c in curve.critical] == [4.0, 4.0, 4.0, None]
+    assert curve.critical[3].outcome == "not_applicable"  # this log has no relations
     assert curve.responses[2].values["unposed_share"] == (1.0,)
     assert "error_max_m" not in curve.responses[2].values  # endless: no number in a file
 
@@ -182,6 +194,36 @@ def test_a_level_that_the_log_does_not_allow_is_told_and_is_no_break(bundle):
     assert curve.critical[0].outcome == "never"
     assert curve.critical[0].low == 0.2
     assert "4 s is not applicable: the log is too short" in curve.notes[0]
+
+
+def test_what_has_no_number_at_its_last_level_is_not_held_to_its_end(bundle):
+    axes = of_levels("wrong.short", [0.1, 0.2, 4.0]), of_levels("wrong.by", [0.1])
+
+    found = answer(bundle, plan(*axes)).results
+
+    short, whole = (row[-1] for row in ranking_rows(found)[1:])
+    assert short.startswith("held up to 0.2 s")
+    assert whole == "held to its end"
+
+
+def test_seeds_without_a_number_are_told(bundle):
+    curve = only(answer(bundle, plan(of_levels("wrong.unsure", [0.1, 1.0]), seeds=8)))
+
+    many = curve.responses[2].values["error_max_m"].count(None)
+    assert 0 < many < 8
+    told = f"no number at 1 m with {many} of 8 seeds (this seed refuses)"
+    assert any(told in note for note in curve.notes)
+
+
+def test_a_judge_is_named_for_the_limits_it_speaks_of(bundle):
+    limits = [("ate_aligned_m", 0.5)]
+
+    aligned = notes(answer(bundle, plan(of_levels("wrong.by", [0.1]), limits=limits)).results)
+    plain = notes(answer(bundle, plan(of_levels("wrong.by", [0.1]))).results)
+
+    assert any("laid onto it" in note for note in aligned)
+    assert not any("nothing aligned" in note for note in aligned)
+    assert any("nothing aligned" in note for note in plain)
 
 
 def test_a_curve_without_any_level_says_why(bundle):
@@ -324,6 +366,20 @@ def test_what_breaks_first_is_the_least_level_and_curves_rank_by_their_range(bun
         ("deaf", "wrong.by", None),
         ("deaf", "wrong.hump", None),
     ]
+
+
+def test_levels_far_from_their_baseline_are_drawn_apart_from_each_other(bundle):
+    results = answer(bundle, plan(of_levels("wrong.shrunk", [0.02, 0.01, 0.0]))).results
+
+    axes = doses_figure(results, {"wrong.shrunk": "words " * 30}).axes[0]
+
+    x = axes.lines[0].get_xdata()
+    apart = -np.diff(x)
+    assert x[1:] == pytest.approx([0.02, 0.01, 0.0])
+    assert 0.0 < apart[0] < 2.0 * apart[1]
+    assert axes.get_xticklabels()[0].get_text() == "1"
+    assert axes.get_ylabel() == "greatest error [m]"
+    assert all(len(line) <= 52 for line in axes.texts[0].get_text().splitlines())
 
 
 def test_every_metric_is_measured_or_there_is_none(bundle):

@@ -85,6 +85,7 @@ def curve(
     ]
     refused = _refusals(trials, estimator, axis, levels, seeds)
     notes += [f"{level:.4g} {axis.unit} is not applicable: {why}" for level, why in refused.items()]
+    notes += _gaps(trials, estimator, axis, [v for v in levels if v not in refused], pairs, plan)
     if not is_random and len(plan.seeds) > 1:
         notes.append("nothing in these trials is drawn at random: one run stands for all seeds, "
                      "and there is no spread")  # fmt: skip
@@ -150,6 +151,30 @@ def _refusals(
         if reasons and all(reasons):
             found[level] = reasons[0]
     return found
+
+
+def _gaps(
+    trials: Trials, estimator: str, axis: Axis, levels: Sequence[float],
+    pairs: Sequence[tuple[int, int]], plan: Plan,
+) -> list[str]:  # fmt: skip
+    """Levels at which some seeds have no number, though undisturbed they have: no break is seen."""
+    notes = []
+    for limit in plan.limits:
+        missing: dict[float, list[int]] = {}
+        for seed, own in pairs:
+            was = broken(trials, estimator, axis, seed, own, limit, levels)
+            for level in levels:
+                if was[axis.baseline] is not None and was.get(level, False) is None:
+                    missing.setdefault(level, []).append(seed)
+        if missing:
+            level, seeds = max(missing.items(), key=lambda item: len(item[1]))
+            trial = trials.dosed(estimator, seeds[0], dose_of(axis, level))
+            why = trials.reason(trial) or "too few poses"
+            notes.append(
+                f"{limit.metric} has no number at {level:.4g} {axis.unit} with {len(seeds)} of "
+                f"{len(pairs)} seeds ({why}): it counts neither as held nor as broken"
+            )
+    return notes
 
 
 def _baseline(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
@@ -24,6 +25,8 @@ from slamreplay.verdict.timeline import BAD, GOOD, held, settled
 #: Numbers that are worst where an estimator has not a single pose.
 _WORST = ("error_max_m", "error_rmse_m", "error_median_m", "error_final_m", "error_max_deg",
           "error_final_deg", "lost_s")  # fmt: skip
+#: The same, where the log has what they are held against.
+_OF_THE_PATH = ("ate_aligned_m", "relations_m", "relations_rad")
 
 Measured = Mapping[str, float | None]
 
@@ -54,7 +57,9 @@ def measured(
     if run.estimate is None:
         return numbers
     track = run.estimate.track
-    told = trial_metrics(run, [baseline], bundle)
+    # One baseline may stand for those of all seeds: it is the one of this run's seed, too.
+    own = replace(baseline, trial=replace(run.trial, perturbation=None, level=None, unit=""))
+    told = trial_metrics(run, [own], bundle)
     if judge is not None:
         told |= nees_metrics(asked_of(run, (judge,), view))
         mean, high = told["nees_mean"], told["nees_high"]
@@ -68,7 +73,9 @@ def measured(
     belief = carried(track, odometry, moments)
     numbers["unposed_share"] = float(1.0 - belief.has_pose.mean())
     if not belief.has_pose.any():
-        return {**numbers, **dict.fromkeys(_WORST, math.inf), "lost_share": 1.0}
+        alone = trial_metrics(baseline, [], bundle)
+        worst = [*_WORST, *(name for name in _OF_THE_PATH if alone[name] is not None)]
+        return {**numbers, **dict.fromkeys(worst, math.inf), "lost_share": 1.0}
     return {**numbers, **_errors(belief, beside if judge is None else judge.track)}
 
 

@@ -21,6 +21,9 @@ class Margin:
         metric: whose limit was crossed at the least level; None where all held.
         level: at which it was; None where all held.
         share: of the range from the baseline to the farthest level tried; None where all held.
+        is_partly: whether fewer than half of the seeds crossed one.
+        held_to: the farthest level known to hold, where no seed crossed any; None otherwise.
+        is_whole: whether that is the farthest level tried.
         undisturbed: metrics beyond their limits undisturbed, which therefore have no part in it.
     """
 
@@ -30,6 +33,9 @@ class Margin:
     metric: str | None
     level: float | None
     share: float | None
+    is_partly: bool
+    held_to: float | None
+    is_whole: bool
     undisturbed: tuple[str, ...]
 
 
@@ -50,5 +56,11 @@ def _margin(curve: DoseCurve) -> Margin:
     farthest = abs(curve.responses[-1].level - curve.baseline)
     share = None if level is None else abs(level - curve.baseline) / farthest
     already = tuple(c.metric for c in curve.critical if c.outcome == "always")
+    outcomes = [c.outcome for c in curve.critical]
+    is_partly = level is None and "partly" in outcomes
+    held = [c.low for c in curve.critical if c.outcome == "never" and c.low is not None]
+    held_to = min(held, key=lambda v: abs(v - curve.baseline), default=None)
+    held_to = None if is_partly or level is not None else held_to
+    is_whole = held_to == curve.responses[-1].level
     return Margin(curve.estimator, curve.perturbation, curve.unit, curve.broke_first, level, share,
-                  already)  # fmt: skip
+                  is_partly, held_to, is_whole, already)  # fmt: skip

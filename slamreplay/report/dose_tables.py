@@ -71,9 +71,18 @@ def ranking_rows(results: DoseResults) -> Rows:
 
 def _margin_cells(margin: Margin) -> tuple[str, str]:
     if margin.level is None or margin.share is None:
-        already = ", ".join(margin.undisturbed)
-        return "-", f"beyond it undisturbed: {already}" if already else "held to its end"
+        return "-", _held_text(margin)
     return f"{margin.level:g} {margin.unit}", f"{margin.share:.0%}"
+
+
+def _held_text(margin: Margin) -> str:
+    if margin.undisturbed:
+        return f"beyond it undisturbed: {', '.join(margin.undisturbed)}"
+    if margin.is_partly:
+        return "most seeds held"
+    if margin.held_to is None or margin.is_whole:
+        return "held to its end"
+    return f"held up to {margin.held_to:g} {margin.unit}: farther out there is no number"
 
 
 def control_rows(controls: Sequence[Control]) -> Rows:
@@ -90,7 +99,7 @@ def control_rows(controls: Sequence[Control]) -> Rows:
 def notes(results: DoseResults) -> list[str]:
     """Sentences that the numbers of this answer need, the failed controls first."""
     told = [warning(control) for control in results.controls if control.passed is False]
-    told.append(_judges(results))
+    told += _judges(results)
     by_note: dict[str, list[str]] = {}
     for curve in results.curves:
         for note in curve.notes:
@@ -127,7 +136,21 @@ def words_of(results: DoseResults) -> dict[str, str]:
     return found
 
 
-def _judges(results: DoseResults) -> str:
+def _judges(results: DoseResults) -> list[str]:
+    """What the metrics of the limits are held against, each kind in a sentence."""
+    asked = {limit.metric.partition("_")[0] for limit in results.limits}
+    found = []
+    if asked & {"error", "lost", "nees"}:
+        found.append(_judged(results))
+    if "ate" in asked:
+        found.append("the aligned trajectory error is held against the log's own reference, in "
+                     "whatever frame, after the whole path was laid onto it")  # fmt: skip
+    if "relations" in asked:
+        found.append("relations are held against those that were given: no frame, no start")
+    return found
+
+
+def _judged(results: DoseResults) -> str:
     whose: dict[str, list[str]] = {}
     for curve in results.curves:
         names = whose.setdefault(curve.judged_by, [])

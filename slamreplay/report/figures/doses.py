@@ -5,12 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from statistics import median
+from textwrap import fill
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
+from matplotlib.ticker import MaxNLocator
 
 from slamreplay.geometry.se2 import Array
 from slamreplay.replay.dose import DoseCurve, DoseResults, Limit
@@ -32,6 +34,10 @@ Place = Callable[[float], float]
 _SIZE = 9.5
 _COLUMNS = 3
 _LOOKS = [(BLUE, "o"), (VERMILLION, "s"), (GREEN, "D"), (PURPLE, "^"), (ORANGE, "v"), (SKY, "P")]
+#: Letters in a line of what a level does: no wider than its panel.
+_WORDS = 52
+#: From this many times the range of its levels away a baseline is drawn beside them.
+_REMOTE = 4.0
 #: From this many limits on a response is drawn on a logarithmic axis beyond the limit.
 _FAR = 4.0
 
@@ -53,6 +59,7 @@ def doses_figure(results: DoseResults, words: dict[str, str], width_in: float = 
     names = list(dict.fromkeys(curve.estimator for curve in results.curves))
     looks = {name: _LOOKS[k % len(_LOOKS)] for k, name in enumerate(names)}
     top = _top(results.curves, limit)
+    told = {c.perturbation: fill(words.get(c.perturbation, ""), _WORDS) for p in panels for c in p}
     for k, axes in enumerate(every):
         if k >= len(panels):
             axes.set_visible(False)
@@ -60,9 +67,10 @@ def doses_figure(results: DoseResults, words: dict[str, str], width_in: float = 
         _panel(axes, panels[k], limit, looks, top)
         first = panels[k][0]
         axes.set_title(first.perturbation, loc="left", fontsize=_SIZE + 1, color=INK,
-                       weight="bold", pad=20)  # fmt: skip
-        axes.text(0.0, 1.02, words.get(first.perturbation, ""), transform=axes.transAxes,
-                  fontsize=_SIZE - 1.5, color=FAINT, va="bottom")  # fmt: skip
+                       weight="bold",
+                       pad=20 + 11 * told[first.perturbation].count("\n"))  # fmt: skip
+        axes.text(0.0, 1.02, told[first.perturbation], transform=axes.transAxes,
+                  fontsize=_SIZE - 1.5, color=FAINT, va="bottom", in_layout=False)  # fmt: skip
         if k % columns:
             axes.set_ylabel("")
     canvas.legend(figure, _handles(looks, limit, results), _SIZE, 1 if columns == 1 else 3)
@@ -142,10 +150,13 @@ def _line(
 def _place_of(curves: Sequence[DoseCurve]) -> Place:
     """Where levels go by factors, their logarithms, with the baseline a step to the left."""
     baseline = curves[0].baseline
+    first, far = _reach(curves)
     if not curves[0].by_factor:
-        return lambda level: level
-    first = min(abs(r.level - baseline) for c in curves for r in c.responses[1:])
-    far = max(abs(r.level - baseline) for c in curves for r in c.responses[1:])
+        if not _is_remote(curves):
+            return lambda level: level
+        side = -1.0 if _is_below(curves[0]) else 1.0
+        beside = baseline + side * (first - 0.2 * (far - first))
+        return lambda level: beside if level == baseline else level
     left = math.log10(first) - 0.12 * max(math.log10(far / first), 1.0)
 
     def place(level: float) -> float:
@@ -154,9 +165,27 @@ def _place_of(curves: Sequence[DoseCurve]) -> Place:
     return place
 
 
+def _reach(curves: Sequence[DoseCurve]) -> tuple[float, float]:
+    """Least and greatest distance of a level from the baseline."""
+    offsets = [abs(r.level - curves[0].baseline) for c in curves for r in c.responses[1:]]
+    return min(offsets, default=0.0), max(offsets, default=0.0)
+
+
+def _is_remote(curves: Sequence[DoseCurve]) -> bool:
+    """Whether the baseline is so far away that all levels would be one point beside it."""
+    first, far = _reach(curves)
+    return not curves[0].by_factor and far > first > _REMOTE * (far - first)
+
+
 def _ticks(axes: Axes, curves: Sequence[DoseCurve], place: Place) -> None:
     baseline, side = curves[0].baseline, -1.0 if _is_below(curves[0]) else 1.0
     if not curves[0].by_factor:
+        if _is_remote(curves):
+            first, far = (baseline + side * d for d in _reach(curves))
+            inner = [t for t in MaxNLocator(4).tick_values(*sorted((first, far)))
+                     if min(first, far) <= t <= max(first, far)]  # fmt: skip
+            labels = [f"{level:g}" for level in [baseline, *inner]]
+            axes.set_xticks([place(baseline), *inner], labels)
         if side < 0.0:
             axes.invert_xaxis()
         return
@@ -193,9 +222,10 @@ def _mark_at(limit: Limit, top: float, k: int) -> float:
 
 def _label(limit: Limit) -> str:
     name, _, unit = limit.metric.rpartition("_")
-    if unit in ("m", "s", "deg", "rad"):
-        return f"{name.replace('_', ' ')} [{unit}]"
-    return f"{limit.metric.replace('_', ' ')} [1]"
+    is_unit = unit in ("m", "s", "deg", "rad")
+    said, above, _ = limit.title.rpartition(" above ")
+    short = said if above else (name if is_unit else limit.metric).replace("_", " ")
+    return f"{fill(short, 32)} [{unit if is_unit else 1}]"
 
 
 def _handles(looks: dict[str, tuple[str, str]], limit: Limit, results: DoseResults) -> list[object]:
