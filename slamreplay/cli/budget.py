@@ -53,7 +53,7 @@ def run_budget(
     check_results_target(output)
     with log_or_scenario(logs, recipe.scenario, options, path) as bundle:
         with progress_bar("replaying") as progress:
-            found = answer(bundle, recipe.parameters, seed, progress, run_folder())
+            found = results(answer(bundle, recipe.parameters, seed, progress, run_folder()))
         head = {
             "question": recipe.question,
             "log": [source.name for source in bundle.manifest.sources],

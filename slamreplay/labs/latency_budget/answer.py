@@ -10,7 +10,6 @@ from slamreplay.bundle.belief import belief_times, recorded_belief
 from slamreplay.bundle.view import Bundle
 from slamreplay.errors import NotApplicableError
 from slamreplay.geometry.times import ns
-from slamreplay.labs.lab import LabResults
 from slamreplay.labs.latency_budget.ask import Budget, Stage
 from slamreplay.labs.latency_budget.gate import GateCurve, gate_curve
 from slamreplay.labs.latency_budget.replayed import Checked, checked
@@ -65,7 +64,7 @@ def answer(
     seed: int,
     progress: Callable[[str, float], None] | None = None,
     cache: Path | None = None,
-) -> LabResults:
+) -> Answer:
     """The answer of a budget recipe to one log.
 
     Args:
@@ -78,8 +77,6 @@ def answer(
     Raises:
         NotApplicableError: the log has neither a localizer nor odometry that moved.
     """
-    from slamreplay.labs.latency_budget.pages import results
-
     view = bundle.view()
     budgets = Budgets(ask.controller_hz, ask.planner_hz)
     found = latency(view, budgets)
@@ -114,4 +111,4 @@ def answer(
         curve = gate_curve(found, fast, room, ask.gate, reach)
     checks = checked(bundle, ask.replayed, ask.stages, seed, progress, cache)
     start_ns = view.manifest.start_ns
-    return results(Answer(ask, whole, usages(whole), staged, curve, checks, start_ns))
+    return Answer(ask, whole, usages(whole), staged, curve, checks, start_ns)
