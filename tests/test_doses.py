@@ -196,12 +196,13 @@ def test_seeds_without_a_number_are_told(bundle):
 
 
 def test_a_judge_is_named_for_the_limits_it_speaks_of(bundle):
-    limits = [("ate_aligned_m", 0.5)]
+    limits = [("ate_aligned_m", 0.5), ("baseline_max_m", 0.5)]
 
     aligned = notes(answer(bundle, plan(of_levels("wrong.by", [0.1]), limits=limits)).results)
     plain = notes(answer(bundle, plan(of_levels("wrong.by", [0.1]))).results)
 
     assert any("laid onto it" in note for note in aligned)
+    assert any("own undisturbed run" in note for note in aligned)
     assert not any("nothing aligned" in note for note in aligned)
     assert any("nothing aligned" in note for note in plain)
 
