@@ -216,12 +216,13 @@ def test_seeds_without_a_number_are_told(bundle):
 
 
 def test_a_judge_is_named_for_the_limits_it_speaks_of(bundle):
-    limits = [("ate_aligned_m", 0.5)]
+    limits = [("ate_aligned_m", 0.5), ("baseline_max_m", 0.5)]
 
     aligned = notes(answer(bundle, plan(of_levels("wrong.by", [0.1]), limits=limits)).results)
     plain = notes(answer(bundle, plan(of_levels("wrong.by", [0.1]))).results)
 
     assert any("laid onto it" in note for note in aligned)
+    assert any("own undisturbed run" in note for note in aligned)
     assert not any("nothing aligned" in note for note in aligned)
     assert any("nothing aligned" in note for note in plain)
 
@@ -368,6 +369,16 @@ def test_what_breaks_first_is_the_least_level_and_curves_rank_by_their_range(bun
     ]
 
 
+def test_a_scale_is_drawn_and_ranked_by_its_logarithm(bundle):
+    results = answer(bundle, plan(of_levels("wrong.shrunk", [0.1, 0.01]))).results
+
+    axes = doses_figure(results, {}).axes[0]
+
+    assert axes.lines[0].get_xdata() == pytest.approx([0.0, -1.0, -2.0])
+    assert [label.get_text() for label in axes.get_xticklabels()][-1] == "1"
+    assert [margin.share for margin in ranking(results)] == [0.5]
+
+
 def test_levels_far_from_their_baseline_are_drawn_apart_from_each_other(bundle):
     results = answer(bundle, plan(of_levels("wrong.shrunk", [0.02, 0.01, 0.0]))).results
 
@@ -375,11 +386,11 @@ def test_levels_far_from_their_baseline_are_drawn_apart_from_each_other(bundle):
 
     x = axes.lines[0].get_xdata()
     apart = -np.diff(x)
-    assert x[1:] == pytest.approx([0.02, 0.01, 0.0])
+    assert x[1:] == pytest.approx([0.02, 0.01, 0.0])  # 0 is in no logarithm: this is no scale
     assert 0.0 < apart[0] < 2.0 * apart[1]
     assert axes.get_xticklabels()[0].get_text() == "1"
     assert axes.get_ylabel() == "greatest error [m]"
-    assert all(len(line) <= 52 for line in axes.texts[0].get_text().splitlines())
+    assert all(len(line) <= 56 for line in axes.texts[0].get_text().splitlines())
 
 
 def test_every_metric_is_measured_or_there_is_none(bundle):

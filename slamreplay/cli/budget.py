@@ -46,6 +46,7 @@ def run_budget(
     from slamreplay.cli.scenario import log_or_scenario
     from slamreplay.labs.folder import check_results_target, write_results
     from slamreplay.labs.latency_budget.answer import answer
+    from slamreplay.labs.latency_budget.pages import results
 
     if given:
         raise UsageError(f"a budget takes no {', '.join(given)}", where=path, hint="leave it out")

@@ -126,6 +126,14 @@ class DoseCurve:
     notes: tuple[str, ...] = ()
     reason: str = ""
 
+    @property
+    def is_scale(self) -> bool:
+        """Whether a level multiplies, over a decade or more: half and double are equally far."""
+        if self.unit != "ratio" or self.baseline <= 0.0 or not self.responses:
+            return False
+        levels = [response.level for response in self.responses]
+        return min(levels) > 0.0 and max(levels) >= 10.0 * min(levels)
+
 
 @dataclass(frozen=True)
 class Control:

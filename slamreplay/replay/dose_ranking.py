@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from slamreplay.replay.dose import Critical, DoseCurve, DoseResults
@@ -20,7 +21,8 @@ class Margin:
         unit: of the level.
         metric: whose limit was crossed at the least level; None where all held.
         level: at which it was; None where all held.
-        share: of the range from the baseline to the farthest level tried; None where all held.
+        share: of the range from the baseline to the farthest level tried, of a scale in logarithms;
+            None where all held.
         is_partly: whether fewer than half of the seeds crossed one.
         held_to: the farthest level known to hold, where no seed crossed any; None otherwise.
         is_whole: whether that is the farthest level tried.
@@ -53,8 +55,11 @@ def critical_of_first(curve: DoseCurve) -> Critical | None:
 def _margin(curve: DoseCurve) -> Margin:
     first = critical_of_first(curve)
     level = None if first is None else first.level
-    farthest = abs(curve.responses[-1].level - curve.baseline)
-    share = None if level is None else abs(level - curve.baseline) / farthest
+    share = (
+        None
+        if level is None
+        else _turned_up(curve, level) / _turned_up(curve, curve.responses[-1].level)
+    )
     already = tuple(c.metric for c in curve.critical if c.outcome == "always")
     outcomes = [c.outcome for c in curve.critical]
     is_partly = level is None and "partly" in outcomes
@@ -64,3 +69,10 @@ def _margin(curve: DoseCurve) -> Margin:
     is_whole = held_to == curve.responses[-1].level
     return Margin(curve.estimator, curve.perturbation, curve.unit, curve.broke_first, level, share,
                   is_partly, held_to, is_whole, already)  # fmt: skip
+
+
+def _turned_up(curve: DoseCurve, level: float) -> float:
+    """How far a level is from the baseline, of a scale by its logarithm."""
+    if curve.is_scale:
+        return abs(math.log(level / curve.baseline))
+    return abs(level - curve.baseline)

@@ -140,8 +140,11 @@ def _judges(results: DoseResults) -> list[str]:
     """What the metrics of the limits are held against, each kind in a sentence."""
     asked = {limit.metric.partition("_")[0] for limit in results.limits}
     found = []
-    if asked & {"error", "lost", "nees"}:
+    if asked & {"error", "lost", "nees", "reference", "hindsight"}:
         found.append(_judged(results))
+    if "baseline" in asked:
+        found.append("distances from the baseline are from the estimator's own undisturbed run, so "
+                     "that what is wrong in both does not show")  # fmt: skip
     if "ate" in asked:
         found.append("the aligned trajectory error is held against the log's own reference, in "
                      "whatever frame, after the whole path was laid onto it")  # fmt: skip

@@ -35,7 +35,7 @@ _SIZE = 9.5
 _COLUMNS = 3
 _LOOKS = [(BLUE, "o"), (VERMILLION, "s"), (GREEN, "D"), (PURPLE, "^"), (ORANGE, "v"), (SKY, "P")]
 #: Letters in a line of what a level does: no wider than its panel.
-_WORDS = 52
+_WORDS = 56
 #: From this many times the range of its levels away a baseline is drawn beside them.
 _REMOTE = 4.0
 #: From this many limits on a response is drawn on a logarithmic axis beyond the limit.
@@ -151,6 +151,8 @@ def _place_of(curves: Sequence[DoseCurve]) -> Place:
     """Where levels go by factors, their logarithms, with the baseline a step to the left."""
     baseline = curves[0].baseline
     first, far = _reach(curves)
+    if _is_scale(curves):
+        return math.log10
     if not curves[0].by_factor:
         if not _is_remote(curves):
             return lambda level: level
@@ -171,14 +173,27 @@ def _reach(curves: Sequence[DoseCurve]) -> tuple[float, float]:
     return min(offsets, default=0.0), max(offsets, default=0.0)
 
 
+def _is_scale(curves: Sequence[DoseCurve]) -> bool:
+    return all(curve.is_scale for curve in curves)
+
+
 def _is_remote(curves: Sequence[DoseCurve]) -> bool:
     """Whether the baseline is so far away that all levels would be one point beside it."""
     first, far = _reach(curves)
+    if _is_scale(curves):
+        return False
     return not curves[0].by_factor and far > first > _REMOTE * (far - first)
 
 
 def _ticks(axes: Axes, curves: Sequence[DoseCurve], place: Place) -> None:
     baseline, side = curves[0].baseline, -1.0 if _is_below(curves[0]) else 1.0
+    if _is_scale(curves):
+        least, most = (f([r.level for c in curves for r in c.responses]) for f in (min, max))
+        shown = [t for t in _tidy(least, most) if 0.999 * least <= t <= 1.001 * most]
+        axes.set_xticks([place(t) for t in shown], [f"{t:g}" for t in shown])
+        if side < 0.0:
+            axes.invert_xaxis()
+        return
     if not curves[0].by_factor:
         if _is_remote(curves):
             first, far = (baseline + side * d for d in _reach(curves))
@@ -190,11 +205,18 @@ def _ticks(axes: Axes, curves: Sequence[DoseCurve], place: Place) -> None:
             axes.invert_xaxis()
         return
     offsets = sorted({abs(r.level - baseline) for c in curves for r in c.responses[1:]})
-    decades = range(math.floor(math.log10(offsets[0])), math.ceil(math.log10(offsets[-1])) + 1)
-    tidy = [m * 10.0**e for e in decades for m in (1.0, 3.0)]
-    shown = [t for t in tidy if offsets[0] * 0.999 <= t <= offsets[-1] * 1.001]
+    shown = [
+        t for t in _tidy(offsets[0], offsets[-1]) if offsets[0] * 0.999 <= t <= offsets[-1] * 1.001
+    ]
     levels = [baseline, *(float(f"{baseline + side * t:.6g}") for t in shown)]
     axes.set_xticks([place(level) for level in levels], [f"{level:g}" for level in levels])
+
+
+def _tidy(least: float, most: float) -> list[float]:
+    """Numbers for a logarithmic axis, a little beyond both ends; few for many decades."""
+    decades = range(math.floor(math.log10(least)), math.ceil(math.log10(most)) + 1)
+    between = (1.0, 3.0) if len(decades) < 5 else (1.0,)
+    return [float(f"{m * 10.0**e:.6g}") for e in decades for m in between]
 
 
 def _scale(axes: Axes, limit: Limit, top: float) -> None:
