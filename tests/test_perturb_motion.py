@@ -11,6 +11,7 @@ from slamreplay.bundle.odometry import odometry_track, topic_track
 from slamreplay.bundle.schema import TABLES
 from slamreplay.bundle.tables import Table
 from slamreplay.errors import NotApplicableError
+from slamreplay.estimators.dead_reckoning import DeadReckoning
 from slamreplay.estimators.ekf.gyro import gyro_of
 from slamreplay.geometry import se2, se3
 from slamreplay.perturb import PERTURBATIONS
@@ -425,3 +426,17 @@ def test_what_levels_a_unit_of_unknown_mount_is_not_lost_with_an_exchange():
 
     gained = biased.turn[-1] - gyro_of(bundle.view()).turn[-1]
     assert np.degrees(gained) == pytest.approx(19.98)
+
+
+def test_a_view_that_leaves_out_what_the_localizer_said_has_no_start_from_it():
+    """Its other tables are exchanged, too: that does not bring the recorded belief back."""
+    view = BUNDLE.view()
+    transforms = view.table("transforms")
+    alone = view.with_table(transforms.take(transforms["parent_frame"] != "map"))
+    for name in ("initial_poses", "poses"):
+        alone = alone.with_table(Table.empty(TABLES[name]))
+
+    run = DeadReckoning().run(alone, seed=0).track
+
+    assert run.frame_id == "odom"
+    assert DeadReckoning().run(view, seed=0).track.frame_id == "map"

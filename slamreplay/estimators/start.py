@@ -128,7 +128,17 @@ def _perturbed(start: Start, view: BundleView) -> Start:
 
 
 def _undisturbed(view: BundleView) -> BundleView:
-    """The log as it was: odometry that is changed must not move the start as well."""
-    if _BELIEVED.isdisjoint(view.tables):
+    """The log as it was: odometry that is changed must not move the start as well.
+
+    A view that leaves out all that the localizer said means it.
+    """
+    if _BELIEVED.isdisjoint(view.tables) or not _says_belief(view):
         return view
     return BundleView(view.bundle, held_out=view.held_out, stretch=view.stretch)
+
+
+def _says_belief(view: BundleView) -> bool:
+    """Whether anything of a localizer is left: poses, or a transform that ends at the map frame."""
+    transforms, frame = view.table("transforms"), view.manifest.frames.map
+    ends = (transforms["parent_frame"] == frame) | (transforms["child_frame"] == frame)
+    return bool(len(view.table("poses")) or ends.any())
