@@ -21,10 +21,10 @@ from slamreplay.errors import BundleError
 from slamreplay.estimators import ESTIMATORS
 from slamreplay.perturb import PERTURBATIONS
 from slamreplay.replay import runner
-from slamreplay.replay.dose_file import read_doses
+from slamreplay.replay.dose_file import doses_json, read_doses
 from slamreplay.replay.dose_ranking import ranking
 from slamreplay.replay.folder import read_runs
-from slamreplay.report.dose_tables import critical_rows, notes, ranking_rows
+from slamreplay.report.dose_tables import critical_rows, notes, ranking_rows, words_of
 from slamreplay.report.figures.doses import doses_figure
 from slamreplay.testing.synthetic import synthetic_bundle
 
@@ -467,3 +467,23 @@ def test_scans_that_are_missing_are_moments_that_count(bundle):
     undisturbed, dropped = (r.values["error_max_m"][0] for r in curve.responses)
     assert dropped > undisturbed + 0.001
     assert curve.responses[1].values["unposed_share"] == pytest.approx((0.0,), abs=0.35)
+
+
+@pytest.mark.parametrize("part", ["limits", "responses", "critical"])
+def test_an_answer_that_lost_a_part_is_refused(bundle, tmp_path, part):
+    found = answer(bundle, plan(of_levels("wrong.by", [1.0])))
+    content = json.loads(doses_json(found.results))
+    (content if part == "limits" else content["curves"][0])[part] = []
+    (tmp_path / "doses.json").write_text(json.dumps(content))
+
+    with pytest.raises(BundleError, match="not a readable answer"):
+        read_doses(tmp_path)
+
+
+def test_what_a_level_does_is_not_told_of_a_perturbation_that_is_gone(bundle, monkeypatch):
+    results = answer(bundle, plan(of_levels("wrong.by", [1.0]))).results
+    assert words_of(results) == {"wrong.by": "off by this much"}
+
+    monkeypatch.delitem(PERTURBATIONS.targets(), "wrong")
+
+    assert words_of(results) == {"wrong.by": ""}

@@ -119,6 +119,12 @@ def by_hand(sigma, clearance, direction, every_s=1.0):
                  np.array(direction, dtype=float), 0)  # fmt: skip
 
 
+def test_without_room_nothing_is_allowed_however_sure_the_robot_is():
+    made = by_hand([0.0, 0.0], [0.0, 0.01], [[1.0, 0.0], [1.0, 0.0]])
+
+    assert made.allowed(0.0, 3.0).tolist() == [False, True]
+
+
 def test_the_gate_adds_the_lag_towards_the_obstacle(room):
     _, found, user = room
     # Straight ahead, and to the side; 3 sigma is 24 cm of 30 cm.

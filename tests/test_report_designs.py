@@ -46,6 +46,7 @@ def test_levels_become_a_curve_with_the_level_at_which_it_broke(bare):
     assert (critical.level, critical.low, critical.outcome) == (0.4, 0.2, "crossed")
     assert curve.responses[3].paired["reference_max_m"].mean == pytest.approx(0.8)
     assert curve.broke_first == "reference_max_m"
+    assert "had no controls" in design_notes(design_of(post))[-1]
 
 
 def test_both_sides_of_a_baseline_are_two_curves_and_refusals_say_why(bare):

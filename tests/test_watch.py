@@ -115,6 +115,16 @@ def test_a_half_written_or_foreign_file_is_nothing(tmp_path):
         assert look(tmp_path, tmp_path / "R").trials[0].trial == trial
 
 
+def test_time_left_runs_down_between_two_words(tmp_path, monkeypatch):
+    with watched(tmp_path, tmp_path / "R") as watch:
+        watch.tell(tmp_path, [TrialState(Trial("b", "amcl", 0), "running", 1.0)], 30.0)
+        told_s = json.loads(next(tmp_path.glob("*.json")).read_text())["told_s"]
+
+        for passed_s, left_s in ((10.0, 20.0), (50.0, 0.0)):
+            monkeypatch.setattr(time, "time", lambda s=passed_s: told_s + s)
+            assert look(tmp_path, tmp_path / "R").left_s == pytest.approx(left_s)
+
+
 def test_after_a_kill_inspect_says_what_is_kept_and_the_command_goes_on(bundle, tmp_path, cache):
     arguments = ["perturb", str(bundle.path), "-o", str(tmp_path / "R"), "-e", "dead_reckoning"]
     for text in TEXTS:

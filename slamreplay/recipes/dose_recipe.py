@@ -8,38 +8,34 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from slamreplay.doses.metrics import limit_of
 from slamreplay.doses.plan import MAX_TRIALS, Axis, Dose, Plan, of_levels, of_search, variant_of
 from slamreplay.errors import UsageError
 from slamreplay.estimators import ESTIMATORS
+from slamreplay.labs.lab import Strict
 from slamreplay.recipes.scenario import ScenarioPart, scenario_of
 from slamreplay.recipes.validation import one_line, validated
 
 _Seed = Annotated[int, Field(ge=0, lt=2**63 - 1000)]
-_Number = Annotated[float, Field(allow_inf_nan=False)]
-_Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-_Levels = Annotated[list[_Number], Field(min_length=1, max_length=100)]
+_Positive = Annotated[float, Field(gt=0)]
+_Levels = Annotated[list[float], Field(min_length=1, max_length=100)]
 _Name = Annotated[str, Field(min_length=1, max_length=80)]
 _UNITS = ("s", "m", "deg", "ratio")
 
 T = TypeVar("T")
 
 
-class _Strict(BaseModel):
-    model_config = ConfigDict(extra="forbid", strict=True)
-
-
-class SearchPart(_Strict):
+class SearchPart(Strict):
     """The range of a search, and the width of the bracket that it ends with."""
 
-    first: Annotated[float, Field(alias="from", allow_inf_nan=False)]
-    to: _Number
+    first: Annotated[float, Field(alias="from")]
+    to: float
     tolerance: _Positive
 
 
-class PerturbationPart(_Strict):
+class PerturbationPart(Strict):
     """A perturbation and its levels, the unit in the key's name: one key of the eight."""
 
     name: _Name
@@ -53,17 +49,17 @@ class PerturbationPart(_Strict):
     search_ratio: SearchPart | None = None
 
 
-class ControlPart(_Strict):
+class ControlPart(Strict):
     """One level that is known to break every estimator, the unit in the key's name."""
 
     name: _Name
-    level_s: _Number | None = None
-    level_m: _Number | None = None
-    level_deg: _Number | None = None
-    level_ratio: _Number | None = None
+    level_s: float | None = None
+    level_m: float | None = None
+    level_deg: float | None = None
+    level_ratio: float | None = None
 
 
-class DoseFile(_Strict):
+class DoseFile(Strict):
     """The keys of such a file."""
 
     version: Literal[1]
@@ -73,7 +69,7 @@ class DoseFile(_Strict):
     scenario: ScenarioPart | None = None
     estimators: Annotated[list[_Name], Field(min_length=1, max_length=50)]
     limits: Annotated[
-        dict[str, Annotated[float, Field(ge=0, allow_inf_nan=False)]],
+        dict[str, Annotated[float, Field(ge=0)]],
         Field(min_length=1, max_length=20),
     ]
     perturbations: Annotated[list[PerturbationPart], Field(min_length=1, max_length=50)]

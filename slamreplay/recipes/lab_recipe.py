@@ -7,18 +7,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from slamreplay.errors import UsageError
 from slamreplay.labs import LABS
-from slamreplay.labs.lab import Lab
+from slamreplay.labs.lab import Lab, Strict
 from slamreplay.recipes.validation import one_line, validated
 
 
-class LabFile(BaseModel):
+class LabFile(Strict):
     """The keys of such a file."""
-
-    model_config = ConfigDict(extra="forbid", strict=True)
 
     version: Literal[1]
     question: Annotated[str, Field(min_length=1, max_length=300)]

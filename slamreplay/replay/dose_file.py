@@ -9,7 +9,7 @@ from pathlib import Path
 from pydantic import TypeAdapter, ValidationError
 
 from slamreplay.errors import BundleError
-from slamreplay.replay.dose import DoseResults
+from slamreplay.replay.dose import DoseCurve, DoseResults
 
 DOSES, DOSES_FORMAT = "doses.json", 1
 
@@ -38,7 +38,19 @@ def read_doses(path: Path) -> DoseResults | None:
                 where=file,
                 hint="run perturb again",
             )
-        return TypeAdapter(DoseResults).validate_json(json.dumps(content), strict=True)
+        results = TypeAdapter(DoseResults).validate_json(json.dumps(content), strict=True)
     except (OSError, ValueError, LookupError, AttributeError, TypeError, ValidationError) as error:
         raise BundleError("not a readable answer of a design", where=file,
                           hint="run perturb again") from error  # fmt: skip
+    if not results.limits or not all(_is_whole(curve, results) for curve in results.curves):
+        raise BundleError("not a readable answer of a design: a part of it is missing", where=file,
+                          hint="run perturb again")  # fmt: skip
+    return results
+
+
+def _is_whole(curve: DoseCurve, results: DoseResults) -> bool:
+    """Whether a curve has a baseline, a level and what became of every limit, or a reason."""
+    if curve.reason:
+        return True
+    metrics = [critical.metric for critical in curve.critical]
+    return len(curve.responses) > 1 and metrics == [limit.metric for limit in results.limits]

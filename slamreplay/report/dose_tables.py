@@ -128,11 +128,12 @@ def panel_of(curve: DoseCurve) -> str:
 
 
 def words_of(results: DoseResults) -> dict[str, str]:
-    """By `NAME.VARIANT`, what a level does."""
+    """By `NAME.VARIANT`, what a level does; empty of one that is not installed here."""
     found = {}
     for curve in results.curves:
         name, _, variant = curve.perturbation.partition(".")
-        found[curve.perturbation] = PERTURBATIONS.load(name).variants[variant].doc
+        known = PERTURBATIONS.load(name).variants if name in PERTURBATIONS else {}
+        found[curve.perturbation] = known[variant].doc if variant in known else ""
     return found
 
 
