@@ -91,6 +91,16 @@ def test_a_failed_control_of_a_recipe_is_the_first_thing_said(bare):
     assert part.curves[0].critical[0].level == 0.2
 
 
+def test_a_note_begins_with_a_capital_unless_it_begins_with_a_name(bare):
+    design = curves_of_trials(with_trials(bare, trial("tf_delay.odometry", 0.2, "s", 0.9)))
+    noted = replace(design, curves=(replace(design.curves[0], notes=("see there",)),))
+
+    said = design_notes(noted)
+
+    assert "tf_delay.odometry with amcl: see there." in said
+    assert all(note[0].isupper() for note in said if "see there" not in note)
+
+
 def test_a_perturbation_that_is_not_installed_here_is_left_to_the_table_of_trials(bare):
     assert curves_of_trials(with_trials(bare, trial("of_a_plug_in.much", 0.5, "m", 0.9))) is None
 
