@@ -279,6 +279,21 @@ def test_a_positive_control_that_breaks_nothing_is_told_loudly(bundle):
     assert notes(found.results)[0].startswith("POSITIVE CONTROL FAILED: deaf, wrong.by at 50 m")
 
 
+def test_a_positive_control_that_leaves_no_number_is_told_apart(bundle):
+    """Of a path without its poses no relation can be said to be wrong."""
+    found = answer(
+        bundle,
+        replace(
+            plan(of_levels("wrong.by", [0.1]), limits=[("nees_mean", 1e9)]),
+            positive_control=Dose("wrong.blind", "m", 50.0),
+        ),
+    ).results
+
+    (control,) = (c for c in found.controls if c.kind == "positive")
+    assert control.passed is False
+    assert "too few poses for nees_mean" in control.text
+
+
 def test_a_baseline_beyond_its_limit_is_told_and_shows_nothing(bundle):
     limits = [("error_max_m", 0.05)]
 

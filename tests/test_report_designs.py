@@ -13,6 +13,7 @@ from slamreplay.report.build import build
 from slamreplay.report.designs import design_notes, design_of, design_table, ranking_table
 from slamreplay.report.evidence import TrialResult
 from slamreplay.report.html import html
+from slamreplay.report.phrases import trials_note
 from slamreplay.report.trace_text import trace_lines
 from slamreplay.report.trial_curves import curves_of_trials
 from slamreplay.testing.synthetic import START_NS, synthetic_bundle
@@ -90,6 +91,32 @@ def test_a_failed_control_of_a_recipe_is_the_first_thing_said(bare):
     assert "POSITIVE CONTROL FAILED" in page
     assert part.controls[0].passed is False
     assert part.curves[0].critical[0].level == 0.2
+
+
+def test_a_note_begins_with_a_capital_unless_it_begins_with_a_name(bare):
+    design = curves_of_trials(with_trials(bare, trial("tf_delay.odometry", 0.2, "s", 0.9)))
+    noted = replace(design, curves=(replace(design.curves[0], notes=("see there",)),))
+
+    said = design_notes(noted)
+
+    assert "tf_delay.odometry with amcl: see there." in said
+    assert all(note[0].isupper() for note in said if "see there" not in note)
+
+
+@pytest.mark.parametrize(
+    ("metric", "says"),
+    [
+        ("reference_rmse_m", "own reference, nothing aligned"),
+        ("hindsight_rmse_m", "to hindsight"),
+        ("ate_aligned_m", "laid onto it"),
+        ("baseline_max_m", "Nothing judges"),
+        ("relations_m", "no frame in common"),
+    ],
+)
+def test_trials_say_what_their_errors_are_held_against(bare, metric, says):
+    one = replace(trial("tf_delay.odometry", 0.2, "s", None), metrics={metric: 0.1})
+
+    assert says in trials_note(replace(bare, trials=(one,)))
 
 
 def test_a_perturbation_that_is_not_installed_here_is_left_to_the_table_of_trials(bare):

@@ -35,6 +35,7 @@ from slamreplay.verdict.summary import MOST_CHARACTERS
 from slamreplay.verdict.timing import Delay, scan_delay
 from slamreplay.verdict.wander import is_pulled_back
 from slamreplay.verdict.wheels import Wheels, wheels
+from slamreplay.verdict.words import square_metres
 
 LIMITS = Limits()
 SAMPLES = Path(__file__).parents[1] / "sample_logs"
@@ -662,3 +663,9 @@ def test_what_was_lacking_is_said():
 
     assert any(line.startswith("no imu") for line in judgement.lacking)
     assert not any(line.startswith("no map") for line in judgement.lacking)
+
+
+def test_a_small_area_is_not_told_as_nothing():
+    assert [square_metres(area) for area in (0.0199, 0.64, 0.97, 12.34)] == [
+        "0.02 m²", "0.64 m²", "1.0 m²", "12.3 m²",
+    ]  # fmt: skip

@@ -76,6 +76,13 @@ def positive(trials: Trials, plan: Plan, estimator: str) -> Control:
     if broken_already:
         already = f"shows nothing: {broken_already[0].metric} is beyond its limit undisturbed"
         return _told(estimator, tried[-1], already, passed=False)
+    baseline = trials.numbers(trials.baseline(estimator, plan.seeds[0])) or {}
+    last = trials.numbers(trials.dosed(estimator, plan.seeds[0], tried[-1])) or {}
+    lost = [x.metric for x in plan.limits
+            if last.get(x.metric) is None and baseline.get(x.metric) is not None]  # fmt: skip
+    if lost:
+        gone = f"shows nothing: it leaves too few poses for {lost[0]}; name a positive_control"
+        return _told(estimator, tried[-1], gone, passed=False)
     return _told(estimator, tried[-1], _BLIND, passed=False)
 
 

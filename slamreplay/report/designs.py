@@ -83,13 +83,19 @@ def design_notes(results: DoseResults | None) -> tuple[str, ...]:
     """What a reader of the numbers must know, failed controls first."""
     if results is None:
         return ()
-    told = [note[0].upper() + note[1:] for note in notes(results)]
+    told = [_sentence(note) for note in notes(results)]
     if not results.controls:
         told.append(
             "These trials had no controls and one seed: a recipe adds both, and searches for the "
             "level at which a limit is crossed"
         )
     return tuple(f"{note}." for note in told)
+
+
+def _sentence(note: str) -> str:
+    """With a capital, unless it begins with a name."""
+    is_name = bool(set(note.partition(" ")[0]) & set("._"))
+    return note if is_name else note[0].upper() + note[1:]
 
 
 def design_alt(results: DoseResults | None) -> str:

@@ -9,6 +9,7 @@ import numpy as np
 from slamreplay.geometry.times import NS_PER_S
 from slamreplay.report.evidence import Postmortem
 from slamreplay.report.figures.covariance import sigma_position_m
+from slamreplay.verdict.words import square_metres
 
 
 @dataclass(frozen=True)
@@ -64,7 +65,7 @@ def _map(post: Postmortem) -> Fact:
     regions = (
         "no changed region"
         if not count
-        else (f"{count} changed region{'s' if count > 1 else ''}, {area:.1f} m² in all")
+        else (f"{count} changed region{'s' if count > 1 else ''}, {square_metres(area)} in all")
     )
     detail = (
         f"Half of all scans stay under {100 * np.nanmedian(changes.changed_share):.1f} %. "

@@ -127,7 +127,14 @@ def trials_note(post: Postmortem) -> str:
         )
     if "reference_rmse_m" in told:
         return "Errors are distances to the log's own reference, nothing aligned."
-    return "Errors are distances to hindsight, nothing aligned."
+    if any(name.startswith("hindsight_") for name in told):
+        return "Errors are distances to hindsight, nothing aligned."
+    if "ate_aligned_m" in told:
+        return (
+            "The log's own reference is in a frame of its own: errors are those of the whole path "
+            "laid onto it."
+        )
+    return "Nothing judges these runs: what is told is how far they are from the baseline."
 
 
 def reference_note(post: Postmortem) -> str:

@@ -16,6 +16,7 @@ from slamreplay.rootcause.trial import Trial
 from slamreplay.verdict.causes_scans import near_change
 from slamreplay.verdict.judgement import ConstantOffset
 from slamreplay.verdict.scan_gaps import scan_gaps
+from slamreplay.verdict.words import square_metres
 
 #: Scans of which so much was cut short, for so long, are worth a try.
 _CUT, _CUT_ROWS = 0.2, 10
@@ -76,7 +77,7 @@ def maps(incident: Incident, healed: Healed, offset: ConstantOffset | None) -> I
     old = healed.told_grid
     if changes is not None and not np.array_equal(e.grid.cells, old.cells):
         area = sum(r.area_m2 for r in changes.regions)
-        words = f"the map as the robot had it, {area:.1f} m² of which is no longer true"
+        words = f"the map as the robot had it, {square_metres(area)} of which is no longer true"
         odds = _CHANGED if near_change(incident.case, incident.onset_ns) else -1.0
         far = distance_field(old, e.config.laser_likelihood_max_dist)
         told = replace(e, grid=old, distance_m=far)

@@ -28,6 +28,11 @@ BECAUSE = {
 BOLD = 3.0
 
 
+def square_metres(area_m2: float) -> str:
+    """An area, with the digits that a chair leg or a box needs, too."""
+    return f"{area_m2:.1f} m²" if area_m2 >= 0.95 else f"{area_m2:.2f} m²"
+
+
 def bold_words(
     error: BeliefError, lost: Interval, sigma_m: se2.Array, start_ns: int
 ) -> tuple[str, ...]:
@@ -57,5 +62,5 @@ def changed_words(changed: Sequence[Interval], hindsight: Hindsight, start_ns: i
     regions = () if hindsight.changes is None else hindsight.changes.regions
     for region in sorted(regions, key=lambda r: -r.area_m2)[:3]:
         x, y = (region.bbox_m[0] + region.bbox_m[2]) / 2, (region.bbox_m[1] + region.bbox_m[3]) / 2
-        words.append(f"{region.area_m2:.1f} m² {region.kind} around ({x:.1f}, {y:.1f})")
+        words.append(f"{square_metres(region.area_m2)} {region.kind} around ({x:.1f}, {y:.1f})")
     return words
