@@ -181,7 +181,7 @@ def _candidate(
         float(np.median([_furthest(r.xyyaw[rows], truth) for r in each.replays]))
         for each in (one, tried[0])
     )
-    text = f"with {trial.words} the belief gets {made:.2f} m off"
+    text = f"with {trial.words}, the belief gets {made:.2f} m off"
     text += "" if k == 0 else f", without it {without:.2f} m"
     start = None if trial.row is None else int(incident.t_ns[trial.row])
     return Candidate(
