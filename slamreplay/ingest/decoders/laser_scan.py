@@ -54,8 +54,8 @@ def _odd(messages: Messages, columns: dict[str, Any], ranges: Ragged) -> NDArray
     zero, which nobody filled in.
     """
     told, step = messages.column("angle_max"), columns["angle_increment_rad"]
-    last = columns["angle_min_rad"] + step * np.maximum(ranges.lengths - 1, 0)
-    with np.errstate(invalid="ignore"):
+    with np.errstate(invalid="ignore"):  # an endless step
+        last = columns["angle_min_rad"] + step * np.maximum(ranges.lengths - 1, 0)
         return np.asarray((told != 0.0) & (np.abs(told - last) > _BEAMS_OFF * np.abs(step)))
 
 
