@@ -24,6 +24,8 @@ from slamreplay.replay import runner
 from slamreplay.replay.dose_file import doses_json, read_doses
 from slamreplay.replay.dose_ranking import ranking
 from slamreplay.replay.folder import read_runs
+from slamreplay.replay.run_cache import run_file
+from slamreplay.replay.runner import Replayer
 from slamreplay.report.dose_tables import critical_rows, notes, ranking_rows, words_of
 from slamreplay.report.figures.doses import doses_figure
 from slamreplay.testing.synthetic import synthetic_bundle
@@ -502,3 +504,21 @@ def test_what_a_level_does_is_not_told_of_a_perturbation_that_is_gone(bundle, mo
     monkeypatch.delitem(PERTURBATIONS.targets(), "wrong")
 
     assert words_of(results) == {"wrong.by": ""}
+
+
+def test_what_is_asked_for_in_any_case_goes_to_all_cores_as_one_round(
+    bundle, tmp_path, monkeypatch
+):
+    tables = {name: bundle.table(name) for name in TABLES}
+    write_bundle(tmp_path / "b", bundle.manifest, tables, {"room": bundle.grid()})
+    there, rounds, replay = Bundle.open(tmp_path / "b"), [], Replayer.replay
+
+    def counted(self, asked, **more):
+        rounds.append([t for t in asked if not run_file(t, tmp_path / "runs").exists()])
+        return replay(self, asked, **more)
+
+    monkeypatch.setattr(Replayer, "replay", counted)
+    answer(there, plan(of_levels("wrong.by", [0.2, 0.8]), seeds=1), cache=tmp_path)
+
+    assert [len(asked) for asked in rounds if asked] == [len(rounds[0])]
+    assert {t.level for t in rounds[0]} >= {None, 0.0, 0.2, 0.8}

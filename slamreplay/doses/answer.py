@@ -10,13 +10,14 @@ from types import MappingProxyType
 from slamreplay.bundle.run import Run, Trial
 from slamreplay.bundle.view import Bundle
 from slamreplay.doses.chance import draws
-from slamreplay.doses.controls import next_positive, no_op, no_op_of, positive
+from slamreplay.doses.controls import next_positive, no_op, no_op_of, positive, positive_doses
 from slamreplay.doses.curves import broken, curve, dose_of, no_curve
 from slamreplay.doses.judge import Judges
 from slamreplay.doses.plan import Axis, Plan
 from slamreplay.doses.search import next_levels
 from slamreplay.doses.trials import Trials
 from slamreplay.replay.dose import Control, DoseCurve, DoseResults
+from slamreplay.replay.run_cache import run_file
 from slamreplay.replay.runner import Replayer
 from slamreplay.replay.watch import Watch
 
@@ -89,7 +90,24 @@ def answer(
     with Replayer(bundle, cache=runs, workers=workers, watch=watch) as replayer:
         numbers = None if cache is None else cache / "numbers"
         trials = Trials(bundle, parameters, plan.seeds[0], judges, replayer, numbers)
+        if runs is not None and bundle.path is not None:
+            # Kept there, they are found below; cores that wait for baselines would be idle.
+            ahead = [t for t in _foreseen(plan, trials) if not run_file(t, runs).is_file()]
+            replayer.replay(ahead, progress=_share_of(progress, 0, len(ahead), plan.most_trials))
         return _answered(bundle, plan, trials, progress)
+
+
+def _foreseen(plan: Plan, trials: Trials) -> list[Trial]:
+    """Trials of the first seed that are asked for whatever the baselines say.
+
+    In vain where an estimator has no pose undisturbed.
+    """
+    seed, found = plan.seeds[0], []
+    for estimator in plan.estimators:
+        doses = [dose_of(axis, v) for axis in plan.axes for v in (axis.baseline, *axis.levels)]
+        found.append(trials.baseline(estimator, seed))
+        found += [trials.dosed(estimator, seed, d) for d in (*doses, positive_doses(plan)[0])]
+    return found
 
 
 def _answered(bundle: Bundle, plan: Plan, trials: Trials, progress: Progress | None) -> Answer:
