@@ -5,14 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-import numpy as np
-
-from slamreplay.bundle.view import BundleView
-from slamreplay.perturb.variant import Variant, check_level
+from slamreplay.perturb.setting_scale import SettingScale
+from slamreplay.perturb.variant import Variant
 
 
 @dataclass(frozen=True)
-class MinScore:
+class MinScore(SettingScale):
     """Scale the score that a loop closure of the pose graph has to reach.
 
     It is a ratio of what is configured, so that it means the same for every configuration: 0.55,
@@ -25,19 +23,3 @@ class MinScore:
         "scale": Variant("ratio", 1.0, "the least score times this", 0, 100),
     }
     touches: ClassVar[frozenset[str]] = frozenset({"min_score"})
-
-    def apply(
-        self,
-        view: BundleView,
-        variant: str,
-        level: float,
-        rng: np.random.Generator,  # noqa: ARG002 - nothing is random
-    ) -> BundleView:
-        """The view with the setting that estimators honour.
-
-        Raises:
-            UsageError: the level is out of range.
-        """
-        if level == check_level(self.name, self.variants, variant, level).baseline:
-            return view
-        return view.with_setting("min_score", level)
