@@ -15,12 +15,11 @@ from slamreplay.bench.cause_scores import cause_scores, is_named
 from slamreplay.bench.cause_table import causes_page
 from slamreplay.bench.incidents import ALL_KINDS
 from slamreplay.bench.measure import Measured
-from slamreplay.bench.pool import played
-from slamreplay.bench.runner import LOGS, PAGE, RESULTS
+from slamreplay.bench.resumed import RESULTS, played_into
+from slamreplay.bench.runner import PAGE
 from slamreplay.bench.schedule import Case, Split, schedule
-from slamreplay.bench.store import fingerprint, read_measured, write_measured
-from slamreplay.bundle.atomic import check_target, write_file
-from slamreplay.errors import OutputError
+from slamreplay.bench.store import fingerprint
+from slamreplay.bundle.atomic import write_file
 from slamreplay.report.figures import canvas
 from slamreplay.report.figures.confusion import confusion_figure
 from slamreplay.report.figures.reliability import reliability_figure
@@ -48,25 +47,11 @@ def run_causes(
     Raises:
         OutputError: the folder is somebody else's or cannot be written.
     """
-    check_target(target, RESULTS)
     cases = schedule(logs, seed, split, kinds, ())
     code = f"{fingerprint()} {' '.join(answerers)}"
-    folder = target / LOGS
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise OutputError(f"cannot write: {error.strerror or error}", where=target) from error
-    # Written first: it marks the folder as ours, should the run be stopped.
-    write_file(target / RESULTS, json.dumps({"complete": False}).encode())
-    done = {c: m for c in cases if (m := read_measured(folder, c, code)) is not None}
-    todo = [c for c in cases if c not in done]
-    say = progress or (lambda _what, _share: None)
-    say(f"{len(done)} logs kept", len(done) / max(len(cases), 1))
-    for one in played(todo, jobs, partial(cause_or_failed, answerers=tuple(answerers))):
-        done[one.case] = one
-        write_measured(folder, one, code)
-        say(one.case.name, len(done) / len(cases))
-    results = causes_of([done[c] for c in cases], seed, split, answerers)
+    play = partial(cause_or_failed, answerers=tuple(answerers))
+    found = played_into(target, cases, code, jobs, play, progress)
+    results = causes_of(found, seed, split, answerers)
     for name, scores in results["answerers"].items():
         _draw(target, name, scores, seed)
     write_file(target / PAGE, causes_page(results).encode())

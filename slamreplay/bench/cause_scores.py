@@ -5,28 +5,17 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import asdict
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 from scipy.special import ndtri
 
 from slamreplay.bench.measure import Measured
+from slamreplay.verdict.judgement import FailureKind
 from slamreplay.verdict.reliability import Bin
 
 #: Answers in the order of the columns.
-NAMES: tuple[str, ...] = (
-    "sensing_ambiguity",
-    "association_error",
-    "optimization_drift",
-    "stale_map_use",
-    "timing",
-    "odometry_slip",
-    "wrong_initial_pose",
-    "kidnapped",
-    "overconfidence",
-    "wrong_map",
-    "none",
-)
+NAMES: tuple[str, ...] = get_args(FailureKind)
 _BINS = 10
 
 

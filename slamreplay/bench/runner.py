@@ -14,18 +14,17 @@ from slamreplay.bench.conditions import CONDITIONS
 from slamreplay.bench.failures import write_case
 from slamreplay.bench.incidents import KINDS
 from slamreplay.bench.measure import Measured, measured
-from slamreplay.bench.pool import played
+from slamreplay.bench.resumed import RESULTS, played_into
 from slamreplay.bench.schedule import Case, Split, schedule
 from slamreplay.bench.scores import hindsight_size, is_right, named, scores
-from slamreplay.bench.store import fingerprint, read_measured, write_measured
+from slamreplay.bench.store import fingerprint
 from slamreplay.bench.table import page
-from slamreplay.bundle.atomic import check_target, write_file
-from slamreplay.errors import OutputError
+from slamreplay.bundle.atomic import write_file
 from slamreplay.report.figures import canvas
 from slamreplay.report.figures.reliability import reliability_figure
 from slamreplay.verdict.reliability import Bin, Reliability
 
-RESULTS, PAGE, LOGS, FAILURES = "results.json", "results.md", "logs", "failures"
+PAGE, FAILURES = "results.md", "failures"
 RELIABILITY, DIAGRAM = "reliability.json", "reliability.svg"
 #: The record that `consistency.evidence.hindsight_size` ships with, from logs to develop with.
 HINDSIGHT_SIZE = "hindsight_size.json"
@@ -53,25 +52,8 @@ def run_benchmark(
     Raises:
         OutputError: the folder is somebody else's or cannot be written.
     """
-    check_target(target, RESULTS)
     cases = schedule(logs, seed, split, kinds, conditions)
-    code = fingerprint()
-    folder = target / LOGS
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise OutputError(f"cannot write: {error.strerror or error}", where=target) from error
-    # Written first: it marks the folder as ours, should the run be stopped.
-    write_file(target / RESULTS, json.dumps({"complete": False}).encode())
-    done = {c: m for c in cases if (m := read_measured(folder, c, code)) is not None}
-    todo = [c for c in cases if c not in done]
-    say = progress or (lambda _what, _share: None)
-    say(f"{len(done)} logs kept", len(done) / max(len(cases), 1))
-    for one in played(todo, jobs, measured_or_failed):
-        done[one.case] = one
-        write_measured(folder, one, code)
-        say(one.case.name, len(done) / len(cases))
-    found = [done[c] for c in cases]
+    found = played_into(target, cases, fingerprint(), jobs, measured_or_failed, progress)
     results = results_of(found, seed, split)
     write_file(target / PAGE, page(results).encode())
     _write_reliability(target, results)
@@ -83,7 +65,8 @@ def run_benchmark(
     write_file(target / RESULTS, text.encode())
     wrong = [m.case for m in found if reports and not is_right(m) and "error" not in m.facts]
     for i, case in enumerate(wrong):
-        say(f"report of {case.name}", i / len(wrong))
+        if progress is not None:
+            progress(f"report of {case.name}", i / len(wrong))
         write_case(case, target / FAILURES)
     return results
 
