@@ -2,12 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 from slamreplay.cli.options import Json, Seed
+from slamreplay.errors import UsageError
+
+Output = Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="Folder to write.")]
+Train = Annotated[
+    bool, typer.Option("--train", help="Play the seeds that are there to develop with.")
+]
+Kind = Annotated[
+    list[str] | None, typer.Option("--kind", help="Only this kind; several by repeating it.")
+]
+AtLeast = Annotated[
+    list[str] | None,
+    typer.Option("--at-least", metavar="FIGURE=NUMBER", help="Exit with 1 where it is lower."),
+]
+Jobs = Annotated[int, typer.Option("--jobs", min=1, help="Processes.")]
 
 
 def register(app: typer.Typer) -> None:
@@ -19,17 +34,13 @@ def register(app: typer.Typer) -> None:
 
 
 def verdict(
-    output: Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="Folder to write.")],
+    output: Output,
     seed: Seed = 0,
     logs: Annotated[
         int | None, typer.Option("--logs", min=1, help="How many logs; 312 by default.")
     ] = None,
-    train: Annotated[
-        bool, typer.Option("--train", help="Play the seeds that are there to develop with.")
-    ] = False,
-    kind: Annotated[
-        list[str] | None, typer.Option("--kind", help="Only this kind; several by repeating it.")
-    ] = None,
+    train: Train = False,
+    kind: Kind = None,
     condition: Annotated[
         list[str] | None,
         typer.Option("--condition", help="Only this condition; several by repeating it."),
@@ -37,15 +48,12 @@ def verdict(
     reports: Annotated[
         bool, typer.Option("--reports", help="Write the report of every log judged wrongly.")
     ] = False,
-    at_least: Annotated[
-        list[str] | None,
-        typer.Option("--at-least", metavar="FIGURE=NUMBER", help="Exit with 1 where it is lower."),
-    ] = None,
+    at_least: AtLeast = None,
     at_most: Annotated[
         list[str] | None,
         typer.Option("--at-most", metavar="FIGURE=NUMBER", help="Exit with 1 where it is higher."),
     ] = None,
-    jobs: Annotated[int, typer.Option("--jobs", min=1, help="Processes.")] = 2,
+    jobs: Jobs = 2,
     as_json: Json = False,
 ) -> None:
     """Judge simulated incidents of every kind and compare with the truth.
@@ -61,12 +69,9 @@ def verdict(
     from slamreplay.bench.schedule import DEFAULT_LOGS
     from slamreplay.bench.table import page
     from slamreplay.cli.progress import progress_bar
-    from slamreplay.errors import UsageError
 
-    for given, known in ((kind, KINDS), (condition, CONDITIONS)):
-        for name in given or ():
-            if name not in known:
-                raise UsageError(f"there is no '{name}'", hint=", ".join(known))
+    _check(kind, KINDS)
+    _check(condition, CONDITIONS)
     goals = [*parse_goals(at_least or [], ">="), *parse_goals(at_most or [], "<=")]
     is_chosen = bool(kind or condition)
     with progress_bar("benchmark") as progress:
@@ -81,41 +86,24 @@ def verdict(
             reports=reports,
             progress=progress,
         )
-    if as_json:
-        import json
-
-        typer.echo(json.dumps(results["scores"], indent=1, allow_nan=False, sort_keys=True))
-    else:
-        typer.echo(page(results))
-        typer.echo(str(output / PAGE), err=True)
-    lines = missed(results["scores"], goals)
-    for line in lines:
-        typer.echo(line, err=True)
-    if lines:
-        raise typer.Exit(1)
+    figures = results["scores"]
+    _tell(figures, None if as_json else page(results), output / PAGE, missed(figures, goals))
 
 
 def causes(
-    output: Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="Folder to write.")],
+    output: Output,
     seed: Seed = 0,
     logs: Annotated[
         int | None, typer.Option("--logs", min=1, help="How many logs; 230 by default.")
     ] = None,
-    train: Annotated[
-        bool, typer.Option("--train", help="Play the seeds that are there to develop with.")
-    ] = False,
-    kind: Annotated[
-        list[str] | None, typer.Option("--kind", help="Only this kind; several by repeating it.")
-    ] = None,
+    train: Train = False,
+    kind: Kind = None,
     by: Annotated[
         list[str] | None,
         typer.Option("--by", help="Who names the causes; all by default, several by repeating it."),
     ] = None,
-    at_least: Annotated[
-        list[str] | None,
-        typer.Option("--at-least", metavar="FIGURE=NUMBER", help="Exit with 1 where it is lower."),
-    ] = None,
-    jobs: Annotated[int, typer.Option("--jobs", min=1, help="Processes.")] = 2,
+    at_least: AtLeast = None,
+    jobs: Jobs = 2,
     as_json: Json = False,
 ) -> None:
     """Name the root causes of simulated incidents whose single cause is known.
@@ -131,12 +119,9 @@ def causes(
     from slamreplay.bench.incidents import ALL_KINDS
     from slamreplay.bench.runner import PAGE
     from slamreplay.cli.progress import progress_bar
-    from slamreplay.errors import UsageError
 
-    for given, known in ((kind, ALL_KINDS), (by, tuple(ANSWERERS))):
-        for name in given or ():
-            if name not in known:
-                raise UsageError(f"there is no '{name}'", hint=", ".join(known))
+    _check(kind, ALL_KINDS)
+    _check(by, ANSWERERS)
     goals = parse_goals(at_least or [], ">=")
     with progress_bar("benchmark") as progress:
         results = run_causes(
@@ -149,14 +134,25 @@ def causes(
             jobs=jobs,
             progress=progress,
         )
-    if as_json:
+    figures = results["answerers"]
+    _tell(figures, None if as_json else causes_page(results), output / PAGE, missed(figures, goals))
+
+
+def _check(given: list[str] | None, known: Iterable[str]) -> None:
+    for name in given or ():
+        if name not in known:
+            raise UsageError(f"there is no '{name}'", hint=", ".join(known))
+
+
+def _tell(figures: dict[str, Any], text: str | None, page: Path, lines: list[str]) -> None:
+    """The figures as JSON or as text; then the goals that were missed, which make the exit code."""
+    if text is None:
         import json
 
-        typer.echo(json.dumps(results["answerers"], indent=1, allow_nan=False, sort_keys=True))
+        typer.echo(json.dumps(figures, indent=1, allow_nan=False, sort_keys=True))
     else:
-        typer.echo(causes_page(results))
-        typer.echo(str(output / PAGE), err=True)
-    lines = missed(results["answerers"], goals)
+        typer.echo(text)
+        typer.echo(str(page), err=True)
     for line in lines:
         typer.echo(line, err=True)
     if lines:
