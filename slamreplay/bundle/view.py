@@ -1,4 +1,8 @@
-"""A bundle to read, and a view of it: the same evidence with at most one perturbation."""
+"""A bundle to read, and a view of it: the same evidence with at most one perturbation.
+
+Both stand in one file, long as it is: a bundle gives views, and a view asks its bundle for whatever
+it has not exchanged itself.
+"""
 
 from __future__ import annotations
 

@@ -1,7 +1,8 @@
 """report.json as types: strict, every key always there, null for what is not known.
 
 `report.schema.json` beside this module is printed from these classes (`python -m
-slamreplay.report.model` rewrites it; a test keeps the two in step).
+slamreplay.report.model` rewrites it; a test keeps the two in step). The file is long because the
+schema is: a class for each object, in the order of the file, and nothing that computes.
 """
 
 from __future__ import annotations
