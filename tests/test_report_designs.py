@@ -72,6 +72,17 @@ def test_both_sides_of_a_baseline_are_two_curves_and_refusals_say_why(bare):
     ] * 2
 
 
+def test_no_dose_is_blamed_for_what_is_broken_undisturbed(bare):
+    post = replace(
+        bare, trials=(trial(None, None, "", 0.8), trial("tf_delay.odometry", 0.2, "s", 0.9))
+    )
+
+    [curve] = curves_of_trials(post).curves
+
+    assert (curve.critical[0].outcome, curve.broke_first) == ("always", None)
+    assert [row[5].text for row in design_table(design_of(post)).rows] == ["nothing more"]
+
+
 def test_without_perturbations_there_is_no_design(bare):
     assert curves_of_trials(with_trials(bare)) is None
     assert build(with_trials(bare)).design is None

@@ -41,8 +41,8 @@ def curves_of_trials(post: Postmortem) -> DoseResults | None:
         for key in sorted(groups, key=lambda key: order.index((key[0], key[-1])))
     ]
     seeds = tuple(sorted({t.run.trial.seed for t in trials}))
-    return DoseResults("What was changed, and how much it took", seeds, judge, (limit,),
-                       tuple(curves), ())  # fmt: skip
+    question = "What do the levels that were tried do to the greatest error?"
+    return DoseResults(question, seeds, judge, (limit,), tuple(curves), ())
 
 
 def _curve(
@@ -79,7 +79,8 @@ def _curve(
         is_random=False,
         responses=tuple(responses) if done else (),
         critical=(critical,) if done else (),
-        broke_first=metric if critical.outcome in ("crossed", "always") else None,
+        # No dose is to be blamed for what is broken undisturbed.
+        broke_first=metric if critical.outcome == "crossed" else None,
         reason="" if done else trials[0].run.not_applicable or "no estimate",
     )
 
