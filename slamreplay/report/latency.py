@@ -13,7 +13,7 @@ from slamreplay.verdict.latency.spread import Spread
 
 _HEAD = (
     "who used it", "rate", "budget", "age of the pose", "95 of 100 below", "oldest",
-    "over budget", "age of the correction", "moved meanwhile", "turned meanwhile",
+    "over budget", "age of the correction", "moved meanwhile",
 )  # fmt: skip
 
 
@@ -74,8 +74,11 @@ def _row(usage: Usage) -> tuple[str | Cell, ...]:
         _ms(usage.pose.most),
         over,
         Cell(_ms(usage.correction.p50), f"95 of 100 below {_ms(usage.correction.p95)}"),
-        Cell(number(usage.unknown_m.p95, ".3f", "m"), "95 of 100 below"),
-        Cell(number(None if turned is None else np.degrees(turned), ".1f", "deg")),
+        Cell(
+            number(usage.unknown_m.p95, ".3f", "m"),
+            f"turned {number(None if turned is None else np.degrees(turned), '.1f', 'deg')}; "
+            "95 of 100 below",
+        ),
     )
 
 
