@@ -277,7 +277,8 @@ def test_joined_members_are_one_text_and_what_is_no_member_is_counted(tmp_path):
 @pytest.mark.parametrize(
     ("content", "error"),
     # No time in the header: it stands in the test's name, which all workers must give alike.
-    [(gzip.compress(b"hello " * 99, mtime=0)[:8], "not a log"), (b"BZh9", "not a log"), (b"", "empty"),
+    [(gzip.compress(b"hello " * 99, mtime=0)[:8], "not a log"),
+     (b"BZh9", "not a log"), (b"", "empty"),
      (b"some text\nODOM to joy\n", "not a log"), (b"# CARMEN Logfile\n#", "nothing to work")],
 )  # fmt: skip
 def test_what_is_no_carmen_log_is_refused_in_one_line(tmp_path, content, error):
