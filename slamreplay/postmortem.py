@@ -23,11 +23,11 @@ from slamreplay.estimators import ESTIMATORS, RECORDED
 from slamreplay.estimators.pose_graph.estimator import PoseGraph
 from slamreplay.estimators.pose_graph.product import MapAndGraph, map_and_graph
 from slamreplay.estimators.recorded import recorded_names
+from slamreplay.evidence.result import Postmortem, TrialResult
 from slamreplay.hindsight.pipeline import hindsight
 from slamreplay.replay.dose import DoseResults
 from slamreplay.replay.metrics import trial_metrics
 from slamreplay.replay.parameters import configured
-from slamreplay.report.evidence import Postmortem, TrialResult
 from slamreplay.report.metrics import asked_of, run_metrics
 from slamreplay.rootcause.answer import root_cause
 from slamreplay.rootcause.mode import mode_of

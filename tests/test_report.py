@@ -26,10 +26,10 @@ from slamreplay.consistency.evidence.nees import nees
 from slamreplay.consistency.statistics.distribution import distribution
 from slamreplay.consistency.statistics.mean_test import mean_test
 from slamreplay.errors import OutputError
+from slamreplay.evidence.result import Postmortem, TrialResult
 from slamreplay.maps.map_server import read_map
 from slamreplay.report.assess import not_assessable
 from slamreplay.report.build import build
-from slamreplay.report.evidence import Postmortem, TrialResult
 from slamreplay.report.facts import deciding_facts
 from slamreplay.report.html import html
 from slamreplay.report.innovations import innovations

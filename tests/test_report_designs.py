@@ -7,11 +7,11 @@ import pytest
 
 from slamreplay.bundle.run import Estimate, Run, Trial
 from slamreplay.bundle.track import PoseTrack
+from slamreplay.evidence.result import TrialResult
 from slamreplay.postmortem import postmortem
 from slamreplay.replay.dose import Control
 from slamreplay.report.build import build
 from slamreplay.report.designs import design_notes, design_of, design_table, ranking_table
-from slamreplay.report.evidence import TrialResult
 from slamreplay.report.html import html
 from slamreplay.report.phrases import trials_note
 from slamreplay.report.trace_text import trace_lines

@@ -17,6 +17,8 @@ from slamreplay.bundle.track import PoseTrack
 from slamreplay.bundle.view import Bundle
 from slamreplay.cli import report
 from slamreplay.errors import UsageError
+from slamreplay.evidence.ledger import ledger_bytes, ledger_sets
+from slamreplay.evidence.trace import trace
 from slamreplay.geometry.times import ns
 from slamreplay.postmortem import postmortem
 from slamreplay.replay.design import design
@@ -24,9 +26,7 @@ from slamreplay.replay.folder import write_runs
 from slamreplay.replay.runner import replay
 from slamreplay.report.build import build
 from slamreplay.report.html import html
-from slamreplay.report.ledger import ledger_bytes, ledger_sets
 from slamreplay.report.model import schema_text
-from slamreplay.report.trace import trace
 from slamreplay.report.trace_text import trace_lines
 from slamreplay.report.writer import write_report
 from slamreplay.testing import edits, synthetic_bundle

@@ -26,9 +26,9 @@ from slamreplay.errors import UsageError
 if TYPE_CHECKING:
     from slamreplay.bundle.run import Run
     from slamreplay.bundle.view import Bundle
+    from slamreplay.evidence.result import Postmortem
     from slamreplay.ingest.options import IngestOptions
     from slamreplay.replay.dose import DoseResults
-    from slamreplay.report.evidence import Postmortem
 
 Evidence = Annotated[
     list[Path],
@@ -129,9 +129,9 @@ def _report(
     )
     with _evidence(logs, options) as (bundle, runs, design):
         from slamreplay.cli.progress import progress_bar
+        from slamreplay.evidence.trace import trace_time
         from slamreplay.postmortem import postmortem
         from slamreplay.report.build import build
-        from slamreplay.report.trace import trace_time
         from slamreplay.report.writer import write_report
 
         manifest = bundle.manifest
@@ -196,9 +196,9 @@ def _summarise(post: Postmortem, page: Path) -> None:
     from rich.console import Console
     from rich.text import Text
 
+    from slamreplay.evidence.words import FAILURE_MODES, STATES
     from slamreplay.report.phrases import percent
     from slamreplay.report.trace_text import trace_lines
-    from slamreplay.report.words import FAILURE_MODES, STATES
 
     judgement = post.judgement
     console = Console(highlight=False, soft_wrap=True)

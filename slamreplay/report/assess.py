@@ -5,7 +5,7 @@ from __future__ import annotations
 from slamreplay.bundle.findings import FINDINGS
 from slamreplay.consistency.evidence.parts import HEADING, POSE, POSITION
 from slamreplay.consistency.evidence.source import SHARED_KINDS
-from slamreplay.report.evidence import Postmortem
+from slamreplay.evidence.result import Postmortem
 
 _NEEDS_BELIEF = ("SR-LOC-001", "SR-MAP-FRAME", "SR-CON-001", "SR-CON-002")
 _NEEDS_HINDSIGHT = ("SR-LOC-001", "SR-LOC-002", "SR-MAP-001", "SR-MAP-FRAME", "SR-MAP-WRONG")

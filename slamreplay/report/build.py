@@ -6,10 +6,10 @@ from typing import Any
 
 from slamreplay import __version__
 from slamreplay.bundle.findings import Finding
+from slamreplay.evidence.result import Postmortem, TrialResult
 from slamreplay.report.assess import title_of
 from slamreplay.report.build_ledger import jump_parts, ledger_part, trace_part
 from slamreplay.report.designs import design_of, design_part
-from slamreplay.report.evidence import Postmortem, TrialResult
 from slamreplay.report.latency import latency_part
 from slamreplay.report.model import (
     SCHEMA_VERSION,

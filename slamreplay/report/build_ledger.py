@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 from slamreplay.bundle.run import Trial
-from slamreplay.report.evidence import Postmortem
-from slamreplay.report.ledger import LEDGER_FILE, LedgerSet
+from slamreplay.evidence.ledger import LEDGER_FILE, LedgerSet
+from slamreplay.evidence.result import Postmortem
+from slamreplay.evidence.trace import WINDOW_NS, Traced
 from slamreplay.report.model import (
     JumpPart,
     LedgerPart,
@@ -15,7 +16,6 @@ from slamreplay.report.model import (
     TraceRowPart,
     TraceRunPart,
 )
-from slamreplay.report.trace import WINDOW_NS, Traced
 
 
 def ledger_part(post: Postmortem) -> LedgerPart:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from slamreplay.report.evidence import Postmortem
+from slamreplay.evidence.result import Postmortem
+from slamreplay.evidence.words import FAILURE_MODES
 from slamreplay.report.phrases import percent, seconds
 from slamreplay.report.tables import Cell, Table, table
-from slamreplay.report.words import FAILURE_MODES
 from slamreplay.rootcause.result import Candidate
 
 _HEAD = ("began as", "what was put back", "how much", "from", "what it did", "probability")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from slamreplay.evidence.result import Postmortem
 from slamreplay.replay.dose import Critical, DoseCurve, DoseResults
 from slamreplay.replay.dose_ranking import Margin, ranking
 from slamreplay.report.dose_tables import (
@@ -13,7 +14,6 @@ from slamreplay.report.dose_tables import (
     ranking_rows,
     words_of,
 )
-from slamreplay.report.evidence import Postmortem
 from slamreplay.report.model import (
     ControlPart,
     CriticalPart,

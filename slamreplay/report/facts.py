@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from slamreplay.evidence.result import Postmortem
 from slamreplay.geometry.times import NS_PER_S
-from slamreplay.report.evidence import Postmortem
 from slamreplay.report.figures.covariance import sigma_position_m
 from slamreplay.verdict.words import square_metres
 

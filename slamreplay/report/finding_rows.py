@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from slamreplay.bundle.findings import FINDINGS, SEVERITIES, Explanation
+from slamreplay.evidence.result import Postmortem
 from slamreplay.report.assess import title_of
-from slamreplay.report.evidence import Postmortem
 from slamreplay.report.phrases import short, span
 
 

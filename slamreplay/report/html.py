@@ -11,10 +11,10 @@ from importlib.resources import files
 from jinja2 import Environment, StrictUndefined
 from matplotlib.figure import Figure
 
-from slamreplay.report.clean import clean
+from slamreplay.evidence.clean import clean
+from slamreplay.evidence.result import Postmortem
 from slamreplay.report.designs import design_of
 from slamreplay.report.dose_tables import words_of
-from slamreplay.report.evidence import Postmortem
 from slamreplay.report.figures import canvas
 from slamreplay.report.figures.consistency import consistency_figure
 from slamreplay.report.figures.course import course_figure

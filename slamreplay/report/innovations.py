@@ -8,8 +8,8 @@ from slamreplay.consistency.innovations.innovation_sets import InnovationSet, in
 from slamreplay.consistency.innovations.nis import nis_tests
 from slamreplay.consistency.innovations.whiteness import LEAST, whiteness
 from slamreplay.consistency.statistics.mean_test import MeanTest
-from slamreplay.report.evidence import Postmortem
-from slamreplay.report.ledger import LEDGER_FILE
+from slamreplay.evidence.ledger import LEDGER_FILE
+from slamreplay.evidence.result import Postmortem
 from slamreplay.report.phrases import NOT_KNOWN, number, percent
 from slamreplay.report.tables import Cell, Table, table
 

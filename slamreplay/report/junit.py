@@ -5,10 +5,10 @@ from __future__ import annotations
 from xml.etree import ElementTree as ET
 
 from slamreplay.bundle.findings import FINDINGS, Finding
+from slamreplay.evidence.clean import clean
+from slamreplay.evidence.result import Postmortem
 from slamreplay.geometry.times import decimal_seconds
 from slamreplay.report.assess import not_assessable, title_of
-from slamreplay.report.clean import clean
-from slamreplay.report.evidence import Postmortem
 
 
 def junit_xml(post: Postmortem) -> str:

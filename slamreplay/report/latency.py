@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from slamreplay.report.evidence import Postmortem
+from slamreplay.evidence.result import Postmortem
 from slamreplay.report.model import AgePart, LatencyPart, UsagePart
 from slamreplay.report.phrases import NOT_KNOWN, number, percent
 from slamreplay.report.tables import Cell, Table, table

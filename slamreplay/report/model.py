@@ -16,7 +16,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
 from slamreplay.bundle.findings import Severity
 from slamreplay.bundle.schema import PARTS
-from slamreplay.report.clean import clean
+from slamreplay.evidence.clean import clean
 from slamreplay.verdict.judgement import FailureKind, State
 
 SCHEMA_VERSION: Literal[1] = 1

@@ -7,11 +7,12 @@ from datetime import UTC, datetime
 
 from slamreplay import __version__
 from slamreplay.bundle.manifest import Manifest, MapVersion
+from slamreplay.evidence.result import Postmortem
+from slamreplay.evidence.words import FAILURE_MODES, STATES, StateWords
 from slamreplay.geometry.times import NS_PER_S
 from slamreplay.report import consistency_tables, designs, phrases, tables, trace_tables
 from slamreplay.report.assess import not_assessable, title_of
 from slamreplay.report.cause_table import cause_note, causes
-from slamreplay.report.evidence import Postmortem
 from slamreplay.report.facts import Fact, deciding_facts
 from slamreplay.report.finding_rows import FindingRow, finding_rows
 from slamreplay.report.innovations import innovations
@@ -19,7 +20,6 @@ from slamreplay.report.latency import latency_note, usage_table
 from slamreplay.report.phrases import percent, seconds
 from slamreplay.report.tables import Table, table
 from slamreplay.report.timeline import Band, bands, marks
-from slamreplay.report.words import FAILURE_MODES, STATES, StateWords
 
 #: Where the rows of the log's own description are.
 _MANIFEST = "the bundle's manifest.json"

@@ -6,9 +6,9 @@ import re
 
 import numpy as np
 
+from slamreplay.evidence.result import Postmortem
+from slamreplay.evidence.words import STATES
 from slamreplay.geometry.times import NS_PER_S
-from slamreplay.report.evidence import Postmortem
-from slamreplay.report.words import STATES
 from slamreplay.verdict.reliability import Reliability
 
 #: What stands in a cell for a number that is not known.

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from slamreplay.report.evidence import Postmortem
+from slamreplay.evidence.result import Postmortem
+from slamreplay.evidence.words import STATES
 from slamreplay.report.phrases import NOT_KNOWN, number, percent, seconds, short, span
-from slamreplay.report.words import STATES
 from slamreplay.verdict.judgement import Consumed
 
 #: Rows of one table on the page; a file beside it has them all.

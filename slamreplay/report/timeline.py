@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from slamreplay.report.evidence import Postmortem
+from slamreplay.evidence.result import Postmortem
+from slamreplay.evidence.words import STATES
 from slamreplay.report.phrases import seconds, span
-from slamreplay.report.words import STATES
 
 
 @dataclass(frozen=True)

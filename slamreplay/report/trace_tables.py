@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 
-from slamreplay.report.evidence import Postmortem
-from slamreplay.report.ledger import LEDGER_FILE, run_name
+from slamreplay.evidence.ledger import LEDGER_FILE, run_name
+from slamreplay.evidence.result import Postmortem
+from slamreplay.evidence.trace import RunTrace, Traced
 from slamreplay.report.phrases import NOT_KNOWN, number, seconds, short
 from slamreplay.report.tables import Cell, Table, table
-from slamreplay.report.trace import RunTrace, Traced
 
 _HEAD = ("when", "measured", "moved it by", "residual", "sigma of it", "NIS", "score", "used")
 #: Rows of one run on the page and in the terminal.

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from slamreplay.consistency.belief.jumps.check import sentence
-from slamreplay.report.evidence import Postmortem
-from slamreplay.report.ledger import run_name
+from slamreplay.evidence.ledger import run_name
+from slamreplay.evidence.result import Postmortem
 from slamreplay.report.tables import Table
 from slamreplay.report.trace_tables import trace_note, traces
 

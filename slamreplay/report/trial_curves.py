@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from slamreplay.evidence.result import Postmortem, TrialResult
 from slamreplay.perturb import PERTURBATIONS
 from slamreplay.replay.dose import DoseCurve, DoseResults, Limit, Response
 from slamreplay.replay.dose_statistics import Bracket, bracket_of, critical_of, paired
-from slamreplay.report.evidence import Postmortem, TrialResult
 
 #: The number that breaks, by how good its judge is, and what it is held against.
 _METRICS = (

@@ -6,13 +6,13 @@ from pathlib import Path
 
 from slamreplay.bundle.atomic import atomic_folder
 from slamreplay.bundle.tum import tum
+from slamreplay.evidence.ledger import LEDGER_FILE, ledger_bytes
+from slamreplay.evidence.result import Postmortem
 from slamreplay.report.build import TRAJECTORY_FILE, build
 from slamreplay.report.changed_map import changed_files
-from slamreplay.report.evidence import Postmortem
 from slamreplay.report.freshness_file import FRESHNESS_FILE, freshness_bytes
 from slamreplay.report.html import html
 from slamreplay.report.junit import junit_xml
-from slamreplay.report.ledger import LEDGER_FILE, ledger_bytes
 
 MARKER = "report.json"
 

@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 from slamreplay.bundle.belief import recorded_belief
 from slamreplay.bundle.scans import scan_set
 from slamreplay.bundle.view import BundleView
+from slamreplay.evidence.result import Postmortem
 from slamreplay.geometry import se2
 from slamreplay.geometry.times import NS_PER_S
 from slamreplay.maps.raycast import cast_rays
 from slamreplay.postmortem import postmortem
-from slamreplay.report.evidence import Postmortem
 from slamreplay.simulate import truth
 from slamreplay.simulate.bundled import bundle_of
 from slamreplay.simulate.recording import Recording, record

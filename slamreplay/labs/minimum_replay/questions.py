@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from slamreplay.report.evidence import Postmortem
+from slamreplay.evidence.result import Postmortem
 from slamreplay.simulate.recording import Recording
 from slamreplay.simulate.topics import START_NS
 

@@ -8,10 +8,10 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from slamreplay.report.evidence import Postmortem
+from slamreplay.evidence.result import Postmortem
+from slamreplay.evidence.words import STATES
 from slamreplay.report.figures import canvas
 from slamreplay.report.figures.canvas import APPEARED, BLUE, FAINT, INK, REMOVED, STATE_COLOURS
-from slamreplay.report.words import STATES
 
 
 def course_figure(post: Postmortem, width_in: float) -> Figure | None:

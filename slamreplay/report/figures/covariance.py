@@ -11,8 +11,8 @@ from matplotlib.patches import Ellipse, Patch
 from numpy.typing import NDArray
 
 from slamreplay.bundle.track import PoseTrack
+from slamreplay.evidence.result import Postmortem
 from slamreplay.geometry import se2
-from slamreplay.report.evidence import Postmortem
 from slamreplay.report.figures import canvas
 from slamreplay.report.figures.canvas import BLUE, FAINT, INK, ORANGE, SKY, VERMILLION
 

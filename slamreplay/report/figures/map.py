@@ -15,9 +15,9 @@ from matplotlib.transforms import Affine2D
 from numpy.typing import NDArray
 
 from slamreplay.bundle.products import ChangedRegion
+from slamreplay.evidence.result import Postmortem
 from slamreplay.geometry import se2
 from slamreplay.maps.grid import OccupancyGrid
-from slamreplay.report.evidence import Postmortem
 from slamreplay.report.figures import canvas
 from slamreplay.report.figures.canvas import APPEARED, BLUE, FAINT, INK, REMOVED, VERMILLION
 

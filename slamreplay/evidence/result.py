@@ -19,12 +19,13 @@ from slamreplay.consistency.belief.summary import ConsistencySummary
 from slamreplay.consistency.evidence.nees import Nees
 from slamreplay.estimators import RECORDED
 from slamreplay.estimators.pose_graph.product import MapAndGraph
+from slamreplay.evidence.ledger import LedgerSet, ledger_sets
+from slamreplay.evidence.scene import Scene
+from slamreplay.evidence.trace import RunTrace, trace
 from slamreplay.geometry import se2
 from slamreplay.geometry.times import seconds_since
 from slamreplay.maps.grid import OccupancyGrid
 from slamreplay.replay.dose import DoseResults
-from slamreplay.report.ledger import LedgerSet, ledger_sets
-from slamreplay.report.trace import RunTrace, trace
 from slamreplay.rootcause.result import RootCause
 from slamreplay.verdict.judgement import ConstantOffset, Judgement
 from slamreplay.verdict.latency.latency import Latency, Usage
@@ -67,6 +68,7 @@ class Postmortem:
             asked.
         latency: how old the pose was whenever it was used, None where that was not asked.
         usages: the same in a few numbers, by consumer.
+        scene: what there was to see at each moment; None where nobody asked.
         slam: the map and the graph that the undisturbed run of `pose_graph` made.
         reliability: how often what was said with a confidence was right, as measured.
     """
@@ -92,6 +94,7 @@ class Postmortem:
     root_cause: RootCause | None = None
     latency: Latency | None = None
     usages: tuple[Usage, ...] = ()
+    scene: Scene | None = None
     slam: MapAndGraph | None = None
     reliability: Reliability = field(default_factory=measured_reliability)
 

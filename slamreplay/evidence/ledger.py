@@ -12,7 +12,7 @@ import numpy as np
 
 from slamreplay.bundle.run import Innovations, Run, Trial
 from slamreplay.consistency.belief.jumps.steps import sizes_of
-from slamreplay.report.clean import clean
+from slamreplay.evidence.clean import clean
 
 LEDGER_FILE = "ledger.parquet"
 

@@ -1,0 +1,1 @@
+"""slamreplay in a notebook: bundles, runs and reports as values that show themselves."""
