@@ -24,6 +24,7 @@ from slamreplay.estimators.pose_graph.estimator import PoseGraph
 from slamreplay.estimators.pose_graph.product import MapAndGraph, map_and_graph
 from slamreplay.estimators.recorded import recorded_names
 from slamreplay.evidence.result import Postmortem, TrialResult
+from slamreplay.evidence.scene_of import scene_of
 from slamreplay.hindsight.pipeline import hindsight
 from slamreplay.replay.dose import DoseResults
 from slamreplay.replay.metrics import trial_metrics
@@ -52,6 +53,7 @@ def postmortem(
     trace_ns: int | None = None,
     design: DoseResults | None = None,
     cause: bool = True,
+    scene: bool = True,
     progress: Callable[[str, float], None] | None = None,
 ) -> Postmortem:
     """Look back on one log.
@@ -69,6 +71,7 @@ def postmortem(
         design: what the runs were laid out by, where it was a recipe.
         trace_ns: a moment around which to tell which measurements moved the belief.
         cause: replay what went wrong with one thing put right at a time.
+        scene: lay out what there was to see at each moment, for a page or an export.
         progress: told what is being done, and the share done from 0 to 1.
     """
     limits = Limits() if limits is None else limits
@@ -130,8 +133,7 @@ def postmortem(
         if run.trial.estimator not in RECORDED
     ]
     slam = _slam(bundle, runs)
-    say("done", 1.0)
-    return Postmortem(
+    post = Postmortem(
         slam=slam,
         manifest=bundle.manifest,
         grid=view.grid,
@@ -155,6 +157,11 @@ def postmortem(
         latency=late,
         usages=used,
     )
+    if scene:
+        say("scene", 0.98)
+        post = replace(post, scene=scene_of(post, view))
+    say("done", 1.0)
+    return post
 
 
 def _recorded(view: BundleView) -> tuple[Run, ...]:

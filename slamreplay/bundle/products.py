@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from slamreplay.bundle.freshness import Freshness
 from slamreplay.bundle.map_course import MapStretch
+from slamreplay.bundle.met import BeamsMet
 from slamreplay.bundle.track import PoseTrack
 from slamreplay.geometry import se2
 
@@ -61,6 +62,7 @@ class Changes:
         opened: (H, W) unmapped cells beside removed walls that were seen empty; None if not known.
         freshness: when each cell was last confirmed and last contradicted.
         corrected: (H, W) int8 the map's cells as the log's end shows them; None if not known.
+        met: what every beam met, by laser; those that hindsight was made of.
     """
 
     appeared: NDArray[np.bool_]
@@ -73,6 +75,7 @@ class Changes:
     opened: NDArray[np.bool_] | None = None
     freshness: Freshness | None = None
     corrected: NDArray[np.int8] | None = None
+    met: tuple[BeamsMet, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

@@ -125,6 +125,15 @@ class Postmortem:
         parts = () if self.hindsight is None else self.hindsight.parts
         return parts[-1].stretch.start_ns if parts else self.manifest.start_ns
 
+    def on_map(self, xyyaw: se2.Array) -> se2.Array:
+        """Poses (..., 3) of the localizer's own map frame in that of the map hindsight is told in.
+
+        They differ where the verdict took a constant offset out of the belief.
+        """
+        if self.frame_offset is None:
+            return xyyaw
+        return se2.compose(se2.inverse(self.frame_offset.xyyaw), xyyaw)
+
     @cached_property
     def error(self) -> BeliefError | None:
         """Belief against hindsight at the belief's times, None without either.
@@ -133,11 +142,8 @@ class Postmortem:
         """
         if self.belief is None or self.hindsight is None:
             return None
-        believed = self.belief.xyyaw
-        if self.frame_offset is not None:
-            believed = se2.compose(se2.inverse(self.frame_offset.xyyaw), believed)
         where = self.hindsight.track.at(self.belief.t_ns)
-        step = believed - where.xyyaw
+        step = self.on_map(self.belief.xyyaw) - where.xyyaw
         return BeliefError(
             self.belief.t_ns,
             np.hypot(step[:, 0], step[:, 1]),

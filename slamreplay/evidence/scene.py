@@ -7,31 +7,28 @@ of its own that a verdict would rest on: it lays what was found on one time axis
 from __future__ import annotations
 
 from dataclasses import dataclass
-from enum import IntEnum
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from slamreplay.bundle.met import Met
 from slamreplay.geometry import se2
+
+__all__ = [
+    "Lane",
+    "LaneKey",
+    "Mark",
+    "MarkKind",
+    "Met",
+    "Scene",
+    "SceneClouds",
+    "ScenePlans",
+    "SceneScans",
+]
 
 MarkKind = Literal["lost", "map_changed", "stop", "recovery", "jump", "start", "finding"]
 LaneKey = Literal["error_m", "error_deg", "sigma_m", "nees", "changed_share", "match"]
-
-
-class Met(IntEnum):
-    """What a beam met, cast from where hindsight says the robot was.
-
-    MOVING ended on something unmapped that did not stay; OTHER says nothing of the map: it met
-    unmapped cells first, or nobody knows where the robot was, or one beam alone decides nothing.
-    """
-
-    INVALID = 0
-    MAPPED = 1
-    APPEARED = 2
-    REMOVED = 3
-    MOVING = 4
-    OTHER = 5
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from slamreplay.bundle.met import BeamsMet
 from slamreplay.bundle.products import Changes
 from slamreplay.geometry import se2
 from slamreplay.hindsight.beams import HIT, INVALID, MISS, Beams
@@ -19,6 +20,7 @@ from slamreplay.hindsight.evidence import Lattice, end_cells, lattice, passes
 from slamreplay.hindsight.freshness import freshness_of
 from slamreplay.hindsight.gone import gone
 from slamreplay.hindsight.mapper import drawn_late, drawn_wrongly
+from slamreplay.hindsight.met import passing, what_was_met
 from slamreplay.hindsight.reach import is_lossy, proven_reach_m
 from slamreplay.hindsight.regions import Contradictions, changed_regions
 from slamreplay.hindsight.standing import asked_cells, standing
@@ -90,6 +92,7 @@ def _look(
     met = (ends >= 0) & ~veil[beams.kind == HIT]  # a veil fills no place, but hides a wall
     new = standing(where, solid, slots, passed.through, (ends[met], bins[met]))
     away = gone(where, laid, ended)
+    stood = new  # whatever maps say of it later
     if earlier:
         late, wrong = (
             drawn_late(where, working, over, new),
@@ -99,6 +102,9 @@ def _look(
         away = replace(away, holds=away.holds & ~wrong[:, None])
     is_new = _at(where, laid, NEARER, new.slots, new.holds)
     is_gone = _at(where, laid, BEYOND, away.slots, away.holds)
+    stayed = _at(where, laid, NEARER, stood.slots, stood.holds)
+    may_pass = passing(where, solid, new, passed, stayed)
+    met_by = what_was_met(beams, laid, is_new, is_gone, may_pass)
 
     valid = np.count_nonzero(beams.kind != INVALID, axis=1).astype(np.float64)
     valid[(valid == 0) | ~np.isfinite(poses).all(axis=1)] = np.nan
@@ -133,6 +139,7 @@ def _look(
         removed_share,
         opened,
         freshness_of(working, where, laid, beams.t_ns, passed, new, away, removed),
+        met=(BeamsMet(beams.t_ns, met_by),),
     )
     return changes, edits
 

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from slamreplay.bundle.met import BeamsMet, padded
 from slamreplay.bundle.products import Changes, Hindsight, Part
 from slamreplay.bundle.track import PoseTrack
 from slamreplay.geometry import se2
@@ -82,7 +83,20 @@ def _changes(parts: Sequence[Part], shape: tuple[int, ...]) -> Changes | None:
         changed_share=shares[0],
         appeared_share=shares[1],
         removed_share=shares[2],
+        met=_met(parts),
     )
+
+
+def _met(parts: Sequence[Part]) -> tuple[BeamsMet, ...]:
+    """Classes of the beams of all stretches, by laser; a stretch may know of fewer lasers."""
+    every = [part.hindsight.changes.met for part in parts if part.hindsight.changes is not None]
+    found = []
+    for k in range(max(map(len, every), default=0)):
+        those = [met[k] for met in every if k < len(met)]
+        width = max(one.met.shape[1] for one in those)
+        t_ns = np.concatenate([one.t_ns for one in those])
+        found.append(BeamsMet(t_ns, np.concatenate([padded(one.met, width) for one in those])))
+    return tuple(found)
 
 
 def _shares(found: Hindsight) -> tuple[NDArray, ...]:

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slamreplay.bundle.map_course import MapStretch
+from slamreplay.bundle.met import BeamsMet
 from slamreplay.bundle.products import Changes, Hindsight, Part
 from slamreplay.bundle.scans import ScanSet, scan_sets
 from slamreplay.bundle.track import PoseTrack
@@ -245,6 +246,11 @@ def _changes(drawn: _Drawn, each: list[Beams], poses: se2.Array, motion: PoseTra
         changed_share=pooled(both, is_first, found.changed_share),
         appeared_share=pooled(both, is_first, found.appeared_share),
         removed_share=pooled(both, is_first, found.removed_share),
+        met=tuple(
+            BeamsMet(met.t_ns[rows], met.met[rows, : one.kind.shape[1]].copy())
+            for met in found.met
+            for rows, one in zip((is_first, ~is_first), each, strict=True)
+        ),
     )
 
 

@@ -81,7 +81,7 @@ def trial(story: Scenario, what: str, level: float, log: int) -> Trial:
     """Drive, record, read the log, and hold a post-mortem on it."""
     recording = record(story, log)
     bundle = bundle_of(recording)
-    found = postmortem(bundle)
+    found = postmortem(bundle, scene=False)
     t_ns = START_NS + np.array([round(float(t) * NS_PER_S) for t in recording.scans.t_s])
     measures = {**_on_board(bundle.view(), t_ns), **_afterwards(found, t_ns)}
     state, lost, changed = _truth(recording, bundle.view(), t_ns)

@@ -43,7 +43,7 @@ class MinimumReplay(Lab):
                 if progress:
                     progress("looking back", len(rows) / of)
                 bundle = bundle_of(recording, edit=recorded(part))
-                post = postmortem(bundle)
+                post = postmortem(bundle, scene=False)
                 answers = {name: ask(post, recording) for name, ask in QUESTIONS.items()}
                 rows.append(Row(log, part, answers, tuple(bundle.manifest.missing_parts())))
         return results(rows, {log: scenario(log).verdict for log in self.logs})

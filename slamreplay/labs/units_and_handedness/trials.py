@@ -78,7 +78,7 @@ def confused(
     ran = {one: _ran(one, view, recording, seed) for one in estimators}
     log = _recorded_so(view)
     audit = ask([CheckContext(None, (), log.view())], AUDITS)
-    post = postmortem(log)
+    post = postmortem(log, scene=False)
     told = _ids(audit)
     return Confused(
         ran,
