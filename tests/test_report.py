@@ -485,4 +485,5 @@ def test_numbers_are_tied_to_their_units():
 def test_templates_ship_with_the_package():
     folder = Path(SCHEMA_FILE).parent / "templates"
 
-    assert {p.name for p in folder.iterdir()} == {"report.css", "report.html.j2"}
+    assert {"report.css", "report.html.j2", "macros.html.j2"} <= {p.name for p in folder.iterdir()}
+    assert all(p.name.endswith(".html.j2") for p in (folder / "sections").iterdir())

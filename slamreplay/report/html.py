@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from importlib.resources import files
 
-from jinja2 import Environment, StrictUndefined
+from jinja2 import Environment, PackageLoader, StrictUndefined
 from matplotlib.figure import Figure
 
 from slamreplay.evidence.clean import clean
@@ -25,6 +25,11 @@ from slamreplay.report.figures.map import map_figure
 from slamreplay.report.figures.reliability import reliability_figure
 from slamreplay.report.page import Page, page
 from slamreplay.report.phrases import bound
+from slamreplay.report.sections import sections
+
+#: Files of the templates' folder that go into the page as they are.
+_STYLES = ("report.css",)
+_SCRIPTS: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -38,23 +43,47 @@ class Picture:
 
 def html(post: Postmortem) -> str:
     """The whole page. Whatever came from the log is escaped by the template engine."""
-    style = files("slamreplay.report").joinpath("templates/report.css").read_text("utf-8")
-    source = files("slamreplay.report").joinpath("templates/report.html.j2").read_text("utf-8")
     view = page(post)
-    # A hash, not 'unsafe-inline': the page's own style is the only one a browser applies.
-    digest = base64.b64encode(hashlib.sha256(style.encode()).digest()).decode()
-    policy = (
-        f"default-src 'none'; img-src data:; style-src 'sha256-{digest}'; "
-        "base-uri 'none'; form-action 'none'"
-    )
+    styles, scripts = _texts(_STYLES), _texts(_SCRIPTS)
     environment = Environment(
-        autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+        loader=PackageLoader("slamreplay.report", "templates"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
     )
     environment.filters["bound"] = bound
-    text = environment.from_string(source).render(
-        page=view, policy=policy, style=style, **_pictures(post, view)
+    pictures = _pictures(post, view)
+    text = environment.get_template("report.html.j2").render(
+        page=view,
+        sections=sections(view, pictures),
+        policy=_policy(styles, scripts),
+        styles=styles,
+        scripts=scripts,
+        **pictures,
     )
     return clean(text)
+
+
+def _texts(names: tuple[str, ...]) -> list[str]:
+    folder = files("slamreplay.report").joinpath("templates")
+    return [folder.joinpath(name).read_text("utf-8") for name in names]
+
+
+def _policy(styles: list[str], scripts: list[str]) -> str:
+    """Hashes, not 'unsafe-inline': the page's own styles and scripts are all that is applied."""
+    return "; ".join([
+        "default-src 'none'",
+        "img-src data:",
+        " ".join(["style-src", *map(_hash, styles)]),
+        *([" ".join(["script-src", *map(_hash, scripts)])] if scripts else []),
+        "base-uri 'none'",
+        "form-action 'none'",
+    ])  # fmt: skip
+
+
+def _hash(text: str) -> str:
+    return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"
 
 
 def _pictures(post: Postmortem, view: Page) -> dict[str, Picture | None]:
