@@ -337,7 +337,7 @@ def test_page_runs_nothing_loads_nothing_and_escapes_the_log(folder):
     assert not any(name.startswith("on") for _, found in page.tags for name in found)
     links = [a.get(k) for _, a in page.tags for k in ("src", "href", "srcset") if a.get(k)]
     assert links
-    assert all(link.startswith("data:image/svg+xml;base64,") for link in links)
+    assert all(link.startswith("data:image/svg+xml,%3Csvg") for link in links)
     policy = next(m["content"] for m in page.all("meta") if "http-equiv" in m)
     assert "default-src 'none'" in policy
     assert "unsafe" not in policy
@@ -485,4 +485,5 @@ def test_numbers_are_tied_to_their_units():
 def test_templates_ship_with_the_package():
     folder = Path(SCHEMA_FILE).parent / "templates"
 
-    assert {p.name for p in folder.iterdir()} == {"report.css", "report.html.j2"}
+    assert {"report.css", "report.html.j2", "macros.html.j2"} <= {p.name for p in folder.iterdir()}
+    assert all(p.name.endswith(".html.j2") for p in (folder / "sections").iterdir())

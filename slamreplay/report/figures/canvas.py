@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import re
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -44,7 +43,6 @@ _STYLE: dict[Any, Any] = {
     "svg.fonttype": "none",  # text stays text
     "font.family": "DejaVu Sans",  # ships with matplotlib: the same layout on every machine
 }
-_FONTS = "system-ui, -apple-system, 'Segoe UI', Roboto, 'Helvetica Neue', Arial, 'DejaVu Sans'"
 
 
 @contextmanager
@@ -94,13 +92,19 @@ def legend(figure: Figure, handles: Iterable[object], size: float, columns: int)
 
 
 def svg_bytes(figure: Figure) -> bytes:
-    """The figure as SVG: same figure, same bytes."""
+    """The figure as an SVG file: same figure, same bytes."""
+    return f'<?xml version="1.0" encoding="utf-8"?>\n{svg_text(figure, dark=False)}\n'.encode()
+
+
+def svg_text(figure: Figure, *, dark: bool) -> str:
+    """The figure as SVG, with colours for dark pages as well where they are asked for."""
+    from slamreplay.report.figures.svg import small_svg
+
     _settle(figure)
     sink = io.BytesIO()
     metadata = {"Date": None, "Creator": None, "Format": None, "Type": None}
     FigureCanvasSVG(figure).print_figure(sink, format="svg", dpi=150, metadata=metadata)
-    text = sink.getvalue().decode().replace("'DejaVu Sans'", _FONTS)
-    return _PATH.sub(_shortened, text).encode()
+    return small_svg(sink.getvalue().decode(), dark=dark)
 
 
 def png_bytes(figure: Figure, dpi: int = 130) -> bytes:
@@ -136,16 +140,6 @@ def _parts(figure: Figure | SubFigure) -> Iterator[Any]:
     for part in figure.subfigs:
         yield part
         yield from _parts(part)
-
-
-# Hundredths of a point cannot be seen, and make up half of the file.
-_PATH = re.compile(r' d="([^"]*)"')
-_DECIMALS = re.compile(r"(\.\d\d)\d+")
-
-
-def _shortened(path: re.Match[str]) -> str:
-    short = _DECIMALS.sub(r"\1", path.group(1)).replace(" \n", "\n").rstrip()
-    return f' d="{short}"'
 
 
 def thinned(t: Array, y: Array, most: int = 1200) -> tuple[Array, Array]:

@@ -1,0 +1,52 @@
+"""The page's sections after its first screen: which of them a log fills, and in which order."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from slamreplay.report.page import Page
+
+
+@dataclass(frozen=True)
+class Section:
+    """A part of the page.
+
+    Attributes:
+        anchor: its id, and the name of its template.
+        title: its heading.
+        short: its name in the table of contents.
+    """
+
+    anchor: str
+    title: str
+    short: str
+
+    @property
+    def template(self) -> str:
+        """Where its text is."""
+        return f"sections/{self.anchor}.html.j2"
+
+
+def sections(page: Page, pictures: Mapping[str, object]) -> tuple[Section, ...]:
+    """Those that have something to say, in the order of the questions that people ask."""
+    every = (
+        (True, Section("when", "When it happened", "When")),
+        (page.cause_note, Section("cause", "What it began with", "Cause")),
+        (True, Section("stops", "Where it stopped, and why", "Stops")),
+        (True, Section("findings", "Findings", "Findings")),
+        (page.jumps.rows or page.trace_note,
+         Section("jumps", "Which measurement moved the belief", "Jumps")),
+        (page.usages.rows, Section("pose-age", "How old was the pose?", "Pose age")),
+        (True, Section("covariance", "Is the covariance honest?", "Covariance")),
+        (page.means.rows, Section("consistency", "Consistency", "Consistency")),
+        (page.design.rows,
+         Section("design", "What was changed, how much it took, and what broke first", "Doses")),
+        (page.trials.rows, Section("trials", "Which evidence it depends on", "Trials")),
+        (pictures["reliability"],
+         Section("confidence", "What the confidence means", "Confidence")),
+        (page.missing or page.unasked,
+         Section("lacking", "What cannot be judged", "Not judged")),
+        (True, Section("basis", "What this rests on", "Sources")),
+    )  # fmt: skip
+    return tuple(section for told, section in every if told)
