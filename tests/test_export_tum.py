@@ -14,7 +14,10 @@ from slamreplay.bundle.store import write_bundle
 from slamreplay.bundle.track import PoseTrack
 from slamreplay.cli import export, perturb
 from slamreplay.errors import OutputError, UsageError
-from slamreplay.export.tum import bundle_as_tum, runs_as_tum, trial_name
+from slamreplay.export.request import Request
+from slamreplay.export.tum import bundle_as_tum, runs_as_tum, trial_name, write_tum
+from slamreplay.geometry.covariance import planar_from_ros
+from slamreplay.ingest.reference_file import read_reference
 from slamreplay.testing.synthetic import synthetic_bundle
 
 
@@ -31,6 +34,10 @@ def call(*arguments: object, catch_exceptions=True):
     export.register(app)
     perturb.register(app)
     return CliRunner().invoke(app, [*map(str, arguments)], catch_exceptions=catch_exceptions)
+
+
+def everything(t_ns):
+    return np.ones(len(t_ns), dtype=bool)
 
 
 def backward_stamps():
@@ -51,8 +58,8 @@ def test_nothing_is_dropped_sorted_or_passed_through_a_float():
     bundle, stamp, run = backward_stamps()
     content = runs_as_tum(bundle, [run])
 
-    assert list(content) == ["amcl.tum"]
-    lines = [line.split() for line in content["amcl.tum"].splitlines()]
+    assert list(content) == ["amcl"]
+    lines = [line.split() for line in content["amcl"].lines(everything).splitlines()]
     assert [int(line[0].replace(".", "")) for line in lines] == stamp.tolist()
     assert lines[0][1] == "nan"
     assert [float(v) for v in lines[1][1:3]] == [0.3, 0.4]
@@ -80,7 +87,54 @@ def test_a_run_without_estimate_has_no_file_and_none_at_all_is_said():
 
 def test_a_bundle_gives_belief_odometry_and_references():
     content = bundle_as_tum(synthetic_bundle(seconds=3.0, with_tags=True))
-    assert sorted(content) == ["belief.tum", "odometry.tum", "reference-truth.tum"]
+    assert sorted(content) == ["belief", "odometry", "reference-truth"]
+
+
+def test_covariances_are_openvins_and_read_back_as_a_reference(tmp_path):
+    bundle, stamp, run = backward_stamps()
+    cov = np.tile(np.diag([0.04, 0.09, 0.01]), (10, 1, 1))
+    cov[:, 0, 1] = cov[:, 1, 0] = 0.02
+    cov[5] = np.nan
+    track = PoseTrack("map", "base_link", run.estimate.track.t_ns, run.estimate.track.xyyaw, cov)
+    run = Run(run.trial, Estimate(track))
+    request = Request(bundle, [run], covariance=True)
+    write_tum(request, tmp_path)
+
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["amcl.openvins.txt", "amcl.tum"]
+    rows, losses = read_reference(tmp_path / "amcl.openvins.txt", "map", "base_link")
+    assert not losses
+    kept = [k for k in range(10) if k not in (0, 5)]  # no pose, no covariance
+    order = np.argsort(rows.t_sensor_ns)
+    kept_order = np.argsort(stamp[kept])
+    np.testing.assert_array_equal(rows.t_sensor_ns[order], stamp[kept][kept_order])
+    back = planar_from_ros(rows.columns["covariance"])[order]
+    want = cov[kept][kept_order]
+    np.testing.assert_allclose(back, want, atol=1e-9)
+
+
+def test_a_window_leaves_lines_out(bundle, tmp_path):
+    ran = call("export", bundle, "--to", "tum", "-o", tmp_path / "T", "--start", 1, "--end", 2)
+    assert ran.exit_code == 0, ran.output
+    lines = (tmp_path / "T" / "odometry.tum").read_text().splitlines()
+    assert len(lines) == 11
+    head = json.loads((tmp_path / "T" / "export.json").read_text())
+    assert head["window_ns"][1] - head["window_ns"][0] == 1_000_000_000
+
+
+@pytest.mark.parametrize(
+    ("more", "words"),
+    [
+        (("--to", "tum", "--only", "recorded"), "takes no --only"),
+        (("--to", "mcap", "--covariance"), "takes no --covariance"),
+        (("--to", "tum", "--start", 90), "nothing is left"),
+        (("--to", "tum", "--start", 2, "--end", 1), "nothing is left"),
+    ],
+)
+def test_what_does_not_fit_is_refused_in_one_line(bundle, tmp_path, more, words):
+    ran = call("export", bundle, *more, "-o", tmp_path / "T")
+    assert isinstance(ran.exception, UsageError)
+    assert words in str(ran.exception)
+    assert not (tmp_path / "T").exists()
 
 
 def test_evo_reads_what_the_command_writes(bundle, tmp_path, monkeypatch):

@@ -110,6 +110,16 @@ def ros_from_openvins(rotation: ArrayLike, position: ArrayLike, R_parent_body: A
     return out
 
 
+def openvins_from_ros(covariance: ArrayLike, R_parent_body: ArrayLike) -> tuple[Array, Array]:
+    """Rotation and position blocks (..., 3, 3) as OpenVINS files have them, of ROS (..., 6, 6).
+
+    The inverse of `ros_from_openvins`; what position and rotation have in common is lost.
+    """
+    cov = np.asarray(covariance, dtype=np.float64)
+    R = np.asarray(R_parent_body, dtype=np.float64)
+    return np.swapaxes(R, -1, -2) @ cov[..., 3:, 3:] @ R, cov[..., :3, :3]
+
+
 def planar_from_gtsam(covariance: ArrayLike, yaw: ArrayLike) -> Array:
     """Parent-axes x y yaw covariances (..., 3, 3) from gtsam Pose2 (body axes) and headings."""
     return turned(covariance, yaw)

@@ -104,6 +104,14 @@ def protections(view: BundleView, low_ns: int, high_ns: int) -> str | None:
     return None
 
 
+def word_of_protection(message: str) -> str:
+    """The words by which `protections` knows a message of a safety device, "" of any other."""
+    found = [pattern.search(message) for pattern in (_PROTECTIVE, _RELEASED)]
+    if found[0] is None:
+        return ""
+    return " ".join(match[0].strip() for match in found if match is not None)
+
+
 def motion_starts(view: BundleView, otherwise: PoseTrack | None) -> tuple[int, ...]:
     """Times at which a motion was begun after a second or more of none."""
     told = commanded(view)
