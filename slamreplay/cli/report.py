@@ -192,36 +192,15 @@ def _evidence(
 
 
 def _summarise(post: Postmortem, page: Path) -> None:
-    """The answer in a few lines; the page's path comes last, alone, for scripts and terminals."""
-    from rich.console import Console
-    from rich.text import Text
-
-    from slamreplay.evidence.words import FAILURE_MODES, STATES
-    from slamreplay.report.phrases import percent
+    """The answer in ten lines; the page's path comes last, alone, for scripts and terminals."""
+    from slamreplay.report.summary import summary_lines
     from slamreplay.report.trace_text import trace_lines
 
-    judgement = post.judgement
-    console = Console(highlight=False, soft_wrap=True)
-    colour = {"healthy": "green", "lost": "red", "lost_and_map_changed": "red"}
-    verdict = Text(judgement.state, style=f"bold {colour.get(judgement.state, 'yellow')}")
-    sure = "" if judgement.confidence is None else f", confidence {percent(judgement.confidence)}"
-    console.print(verdict, Text(f"({STATES[judgement.state].meaning}{sure})"))
-    console.print(Text(judgement.summary))
-    mode = judgement.failure_mode
-    if mode.kind != "none":
-        console.print(Text(f"failure mode: {FAILURE_MODES[mode.kind]}"))
-    cause = post.root_cause
-    if cause is not None and cause.trials:
-        likely = f"{FAILURE_MODES[cause.began_as]}, {percent(cause.probability)}"
-        console.print(Text(f"root cause: {likely}, by {cause.trials} replays"))
-    missing = post.manifest.missing_parts()
-    if missing:
-        console.print(Text(f"missing: {', '.join(missing)}", style="dim"))
-    counts = {s: sum(f.severity == s for f in post.findings) for s in reversed(SEVERITIES)}
-    console.print(Text(f"findings: {', '.join(f'{n} {s}' for s, n in counts.items())}"))
-    for line in trace_lines(post):
-        console.print(Text(line))
-    console.print(Text(str(page)))
+    for line in summary_lines(post):
+        typer.echo(f"{line.label}: {line.text}")
+    for text in trace_lines(post):
+        typer.echo(text)
+    typer.echo(str(page))
 
 
 def _severity(text: str | None) -> Severity | None:
