@@ -81,7 +81,8 @@ def passing(
     for down in range(3):
         for right in range(3):
             slot = slots[row + down, col + right]
-            did_pass &= ~((slot >= 0) & new.holds[slot, where.bins[scan]])
+            near = slot >= 0
+            did_pass[near] &= ~new.holds[slot[near], where.bins[scan[near]]]
     out = np.zeros(laid.says.shape, dtype=bool)
     out[scan[did_pass], beam[did_pass]] = True
     return out
