@@ -1,14 +1,40 @@
 """What there was to see at each moment: scans, beam classes, particles, plans, marks and lanes."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from beam_truth import UNASKED, what_was_met
+from hypothesis import given
+from hypothesis import strategies as st
 
+from slamreplay.bundle.manifest import Role
+from slamreplay.bundle.met import BeamsMet
+from slamreplay.bundle.schema import TABLES
+from slamreplay.bundle.tables import Ragged, Table
+from slamreplay.bundle.view import Bundle
+from slamreplay.estimators.amcl.config import AmclConfig
 from slamreplay.evidence.scene import Met
+from slamreplay.evidence.scene_lanes import largest_sigma
 from slamreplay.evidence.scene_of import scene_of
 from slamreplay.evidence.scene_scans import chosen
+from slamreplay.geometry import se2
+from slamreplay.hindsight.beams import HIT, Beams
+from slamreplay.hindsight.met import TOGETHER_M, has_neighbour
+from slamreplay.hindsight.pipeline import hindsight
 from slamreplay.maps.grid import OccupancyGrid
 from slamreplay.postmortem import postmortem
-from slamreplay.testing.synthetic import room_grid, synthetic_bundle
+from slamreplay.simulate.bundled import bundle_of
+from slamreplay.simulate.drive import Follow, Pause
+from slamreplay.simulate.people import Walker
+from slamreplay.simulate.recording import record
+from slamreplay.simulate.scenarios import Scenario
+from slamreplay.simulate.sensors import Lidar
+from slamreplay.simulate.worlds import box, warehouse
+from slamreplay.testing.edits import rebuilt, with_maps, with_repeated_stamps, without
+from slamreplay.testing.synthetic import START_NS, room_grid, synthetic_bundle
+from slamreplay.testing.synthetic_rows import ns_of
+from slamreplay.verdict.judgement import ConstantOffset
 
 
 def room_with_a_box() -> OccupancyGrid:
@@ -30,15 +56,20 @@ def boxed():
     return bundle.view(), postmortem(bundle, cause=False)
 
 
+def assert_shares(scans, changes):
+    """The share of beams that the verdict counts is that of the beams classed so."""
+    valid = np.count_nonzero(scans.met != Met.INVALID, axis=1)
+    changed = np.isin(scans.met, (Met.APPEARED, Met.REMOVED)).sum(axis=1)
+    assert np.array_equal(scans.t_ns, changes.t_ns)
+    assert np.array_equal(changed / valid, changes.changed_share)
+
+
 def test_changed_share_is_the_share_of_beams_classed_so(boxed):
     _, post = boxed
     (scans,), changes = post.scene.scans, post.hindsight.changes
 
-    valid = np.count_nonzero(scans.met != Met.INVALID, axis=1)
-    changed = np.isin(scans.met, (Met.APPEARED, Met.REMOVED)).sum(axis=1)
-    assert np.array_equal(scans.t_ns, changes.t_ns)
-    assert changed.max() > 5
-    assert np.array_equal(changed / valid, changes.changed_share)
+    assert np.count_nonzero(scans.met == Met.APPEARED) > 200
+    assert_shares(scans, changes)
 
 
 def test_marks_stand_in_time_order_and_tell_when_the_robot_was_lost(boxed):
@@ -77,10 +108,261 @@ def test_fewer_scans_are_shown_but_the_first_the_last_and_those_around_what_happ
     assert np.abs(few.t_ns - lost.t_ns).min() <= 200_000_000
 
 
-def test_chosen_rows_are_never_more_than_were_asked_for():
-    t_ns = np.arange(1000, dtype=np.int64) * 100_000_000
-    for most in (2, 3, 10, 100):
-        rows = chosen(t_ns, [0, 5_000_000_000, 99_900_000_000], most)
-        assert len(rows) <= most
-        assert (rows[0], rows[-1]) == (0, 999)
-        assert (np.diff(rows) > 0).all()
+# --- beams -------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def told():
+    """Two lasers pass a rack that is gone, a box that was set down, and people; and the truth."""
+    mapped = warehouse()
+    pallet = box("pallet", 6.6, 4.3, 1.0, 1.2)
+    people = (Walker(((9.0, 5.1), (14.5, 5.2))), Walker(((16.5, 1.0), (16.9, 8.2))))
+    story = Scenario(
+        mapped,
+        mapped.changed(without=("rack a2",), added=(pallet,)),
+        (15.0, 4.6, np.pi),
+        (Pause(1.0), Follow(((9.4, 4.6),)), Pause(2.0)),
+        "map_changed",
+        1,
+        walkers=people,
+        lidar=Lidar(beams=181),
+        rear=Lidar(beams=161),
+        amcl=AmclConfig(min_particles=50, max_particles=100),
+    )
+    recording = record(story)
+    return recording, bundle_of(recording).view()
+
+
+def test_beams_are_classed_by_what_they_met(told):
+    recording, view = told
+    found = hindsight(view)
+    truth = {t_ns[0]: (t_ns, met) for t_ns, met in what_was_met(recording)}
+    confusion = np.zeros((len(Met), len(Met)), dtype=int)
+
+    assert len(found.changes.met) == 2
+    for one in found.changes.met:
+        t_ns, met = truth.pop(one.t_ns[0])
+        assert np.array_equal(t_ns, one.t_ns)
+        asked = met != UNASKED
+        np.add.at(confusion, (met[asked], one.met[asked]), 1)
+
+    right = np.diagonal(confusion)
+    assert confusion.sum(axis=1)[: Met.OTHER].min() > 50
+    for code, recall, precision in (
+        (Met.INVALID, 1.0, 1.0),
+        (Met.MAPPED, 0.98, 0.99),
+        (Met.APPEARED, 0.95, 0.99),
+        (Met.REMOVED, 0.95, 0.98),
+        (Met.MOVING, 0.95, 0.99),
+    ):
+        assert right[code] >= recall * confusion[code].sum(), code.name
+        assert right[code] >= precision * confusion[:, code].sum(), code.name
+
+
+def test_both_lasers_are_shown_at_the_same_moments(told):
+    _, view = told
+    post = postmortem(view.bundle, cause=False, scene=False)
+    first, second = scene_of(post, view, most_scans=10).scans
+
+    assert post.scene is None
+    assert len(first.t_ns) == 10
+    assert np.abs(second.t_ns[:, None] - first.t_ns).min(axis=1).max() < 100_000_000
+    assert {first.met.shape[1], second.met.shape[1]} == {181, 161}
+    assert np.abs(first.laser_xy - second.laser_xy).max() > 0.2
+
+
+def test_nothing_is_said_of_beams_from_where_nobody_knows_the_robot_was():
+    t_ns = START_NS + np.arange(4)
+    one = BeamsMet(t_ns[:2], np.full((2, 3), Met.MAPPED, dtype=np.uint8))
+
+    met = one.at(t_ns, 4)
+
+    assert met[:2].tolist() == [[Met.MAPPED] * 3 + [Met.INVALID]] * 2
+    assert (met[2:] == Met.OTHER).all()
+
+
+times = st.lists(st.integers(0, 6), max_size=12).map(sorted)
+
+
+@given(times, times)
+def test_scans_of_one_time_are_told_apart_by_their_order(known, asked):
+    classes = np.arange(len(known), dtype=np.uint8)[:, None]
+    found = BeamsMet(np.array(known, dtype=np.int64), classes).at(np.array(asked, np.int64), 1)
+
+    for k, t_ns in enumerate(asked):
+        rows = [i for i, other in enumerate(known) if other == t_ns]
+        order = asked[:k].count(t_ns)
+        expected = rows[order] if order < len(rows) else int(Met.OTHER)
+        assert found[k, 0] == expected
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_beams_with_a_neighbour_equal_their_plain_twin(seed):
+    rng = np.random.default_rng(seed)
+    ends = rng.uniform(0.0, 0.6, (3, 8, 2)).astype(np.float32)
+    those = rng.random((3, 8)) < 0.6
+    kind = np.full((3, 8), HIT, dtype=np.int8)
+    beams = Beams(np.arange(3), ends, kind, np.zeros(2))
+
+    expected = np.zeros_like(those)
+    for s in range(3):
+        for b in range(8):
+            for other in (b - 1, b + 1):
+                if 0 <= other < 8 and those[s, b] and those[s, other]:
+                    expected[s, b] |= np.hypot(*(ends[s, b] - ends[s, other])) <= TOGETHER_M
+    assert np.array_equal(has_neighbour(beams, those), expected)
+
+
+def test_each_floor_has_its_beams_classed_in_its_own_map():
+    first = synthetic_bundle(seconds=24.0, world=room_with_a_box())
+    other = OccupancyGrid(np.flipud(room_grid().cells), 0.05, room_grid().origin_xyyaw)
+    second = synthetic_bundle(seconds=24.0, world=other)
+    switch_ns = START_NS + 12_000_000_000
+    scans = [first.table("scans"), second.table("scans")]
+    scans = [scans[0].take(scans[0].t_ns < switch_ns), scans[1].take(scans[1].t_ns >= switch_ns)]
+    bundle = rebuilt(first, {"scans": Table.concat(TABLES["scans"], scans)})
+    bundle = with_maps(bundle, [(START_NS, room_grid()), (switch_ns, other)])
+
+    post = postmortem(bundle, cause=False)
+    (shown,), changes = post.scene.scans, post.hindsight.changes
+
+    assert len(post.hindsight.parts) == 2
+    assert_shares(shown, changes)
+    before = shown.t_ns < switch_ns
+    hits = shown.met[shown.is_hit & ~before[:, None]]
+    assert np.count_nonzero(shown.met[before] == Met.APPEARED) > 100
+    assert np.mean(hits == Met.MAPPED) > 0.98
+
+
+def test_repeated_stamps_do_not_mix_up_the_beams():
+    post = postmortem(with_repeated_stamps(synthetic_bundle(seconds=6.0)), cause=False)
+
+    assert_shares(post.scene.scans[0], post.hindsight.changes)
+
+
+# --- logs that lack something, and logs that hold more ------------------------------------------
+
+
+def test_scans_are_shown_without_a_map_too():
+    post = postmortem(synthetic_bundle(seconds=3.0, with_map=False), cause=False)
+    (scans,) = post.scene.scans
+
+    assert post.hindsight is None
+    assert scans.is_hit.mean() > 0.9
+    assert (scans.met[scans.is_hit] == Met.OTHER).all()
+    assert {lane.key for lane in post.scene.lanes} <= {"sigma_m", "nees"}
+
+
+def test_log_without_scans_has_a_scene_without_any():
+    bundle = without(synthetic_bundle(seconds=3.0), "scans")
+    scene = postmortem(bundle, cause=False).scene
+
+    assert scene.scans == ()
+    assert scene.clouds is None
+    assert scene.plans is None
+    assert len(scene.footprint_xy) > 3
+
+
+def test_lane_of_a_placeholder_covariance_is_left_out():
+    bundle = synthetic_bundle(seconds=3.0)
+    poses = bundle.table("poses")
+    zero = poses.replace(covariance=np.zeros_like(poses["covariance"]))
+    post = postmortem(rebuilt(bundle, {"poses": zero}), cause=False)
+
+    lanes = [lane.key for lane in post.scene.lanes]
+
+    assert "sigma_m" not in lanes
+    assert "nees" not in lanes
+    assert "error_m" in lanes
+
+
+def test_largest_sigma_is_that_of_the_worst_direction():
+    turn = np.array([[np.cos(0.7), -np.sin(0.7)], [np.sin(0.7), np.cos(0.7)]])
+    cov = np.full((2, 3, 3), np.nan)
+    cov[0] = np.diag([1.0, 1.0, 0.1])
+    cov[0, :2, :2] = turn @ np.diag([0.04, 0.25]) @ turn.T
+
+    sigma = largest_sigma(cov)
+
+    assert sigma[0] == pytest.approx(0.5)
+    assert np.isnan(sigma[1])
+
+
+def rows_of(name: str, topic: str, t_s: list[float], /, **columns) -> Table:
+    t_ns = ns_of(np.array(t_s))
+    times = dict.fromkeys(("t_ns", "t_sensor_ns", "t_log_ns"), t_ns)
+    return Table(TABLES[name], {**times, "topic": [topic] * len(t_s), **columns})
+
+
+def with_paths(bundle: Bundle) -> Bundle:
+    """The bundle with two clouds and three plans; the last ones lie in the odometry's frame."""
+    rng = np.random.default_rng(3)
+    clouds = [np.column_stack([rng.normal(0, 1, (k, 2)), np.zeros(k)]) for k in (200, 1000)]
+    weights = [np.ones(200), np.where(clouds[1][:, 0] > 0.0, 1.0, 0.0)]
+    line = np.column_stack([np.arange(400) * 0.05, np.zeros(400), np.zeros(400)])
+    particles = rows_of(
+        "particles",
+        "/cloud",
+        [1.0, 2.0],
+        frame_id=["map", "map"],
+        xyyaw=Ragged.of(clouds, np.float64),
+        weights=Ragged.of(weights, np.float64),
+    )
+    plans = rows_of(
+        "plans",
+        "/plan",
+        [0.5, 1.5, 2.5],
+        frame_id=["map", "odom", "elsewhere"],
+        xyyaw=Ragged.of([line] * 3, np.float64),
+    )
+    made = rebuilt(bundle, {"particles": particles, "plans": plans})
+    roles = [
+        Role(role=role, topic=topic, type="t", messages=1, reason="r")
+        for role, topic in (("particles", "/cloud"), ("plan", "/plan"))
+    ]
+    manifest = made.manifest.model_copy(update={"roles": [*made.manifest.roles, *roles]})
+    tables = {name: made.table(name) for name in TABLES}
+    return Bundle(manifest, tables, made.grids())
+
+
+def test_particles_and_plans_lie_in_the_map_frame():
+    bundle = with_paths(synthetic_bundle(seconds=3.0))
+    post = postmortem(bundle, cause=False, scene=False)
+    few, whole = (scene_of(post, bundle.view(), most_scans=most) for most in (30, None))
+
+    assert np.diff(whole.clouds.first).tolist() == [200, 1000]
+    assert np.diff(few.clouds.first).tolist() == [200, 300]
+    assert (few.clouds.xyyaw[200:, 0] > 0.0).all()  # the others weigh nothing
+    assert len(whole.plans.t_ns) == 2  # nothing ties the third one's frame to the map
+    assert np.diff(whole.plans.first).tolist() == [400, 400]
+    odom, valid = bundle.view().transforms.lookup("map", "odom", whole.plans.t_ns[1:])
+    assert valid.all()
+    np.testing.assert_allclose(whole.plans.xy[400], odom[0, :2, 3], atol=1e-5)
+    np.testing.assert_allclose(few.plans.xy[[99, -1]], whole.plans.xy[[399, -1]])
+
+
+def test_constant_offset_of_the_localizers_map_is_taken_out_of_particles_and_plans():
+    bundle = with_paths(synthetic_bundle(seconds=3.0))
+    post = postmortem(bundle, cause=False, scene=False)
+    offset = (1.0, -2.0, 0.3)
+    shifted = replace(post, frame_offset=ConstantOffset(offset, 2.2, 0.3, 0.01, "map"))
+    own, there = (scene_of(p, bundle.view(), most_scans=None) for p in (post, shifted))
+
+    np.testing.assert_allclose(se2.compose(offset, there.clouds.xyyaw), own.clouds.xyyaw, atol=1e-5)
+    np.testing.assert_allclose(
+        se2.transform_points(offset, there.plans.xy), own.plans.xy, atol=1e-5
+    )
+
+
+@given(
+    st.lists(st.integers(0, 10**6), min_size=1, max_size=60).map(sorted),
+    st.lists(st.integers(-100, 10**6 + 100), max_size=8),
+    st.integers(2, 40),
+)
+def test_chosen_rows_hold_the_first_and_the_last_and_are_within_bounds(t_ns, moments, most):
+    t_ns = np.array(t_ns, dtype=np.int64)
+    rows = chosen(t_ns, moments, most)
+
+    assert len(rows) <= max(most, 0)
+    assert (np.diff(rows) > 0).all()
+    assert (t_ns[rows[0]], t_ns[rows[-1]]) == (t_ns[0], t_ns[-1])

@@ -93,6 +93,8 @@ def _of_one(post: Postmortem, laser: ScanSet, told: BeamsMet | None) -> SceneSca
 
 
 def _only(laser: ScanSet, rows: NDArray[np.int64]) -> ScanSet:
+    if len(rows) == len(laser):
+        return laser
     return replace(
         laser,
         t_ns=laser.t_ns[rows],

@@ -89,8 +89,9 @@ def _look(
     ends = end_cells(where, beams, poses)
     bins = np.broadcast_to(where.bins[:, None], beams.kind.shape)[beams.kind == HIT]
     ended = (ends[ends >= 0], bins[ends >= 0])
-    met = (ends >= 0) & ~veil[beams.kind == HIT]  # a veil fills no place, but hides a wall
-    new = standing(where, solid, slots, passed.through, (ends[met], bins[met]))
+    solid_ends = (ends >= 0) & ~veil[beams.kind == HIT]  # a veil fills no place, but hides a wall
+    met_by = (ends[solid_ends], bins[solid_ends])
+    new = standing(where, solid, slots, passed.through, met_by)
     away = gone(where, laid, ended)
     stood = new  # whatever maps say of it later
     if earlier:
@@ -102,9 +103,8 @@ def _look(
         away = replace(away, holds=away.holds & ~wrong[:, None])
     is_new = _at(where, laid, NEARER, new.slots, new.holds)
     is_gone = _at(where, laid, BEYOND, away.slots, away.holds)
-    stayed = _at(where, laid, NEARER, stood.slots, stood.holds)
-    may_pass = passing(where, solid, new, passed, stayed)
-    met_by = what_was_met(beams, laid, is_new, is_gone, may_pass)
+    may_pass = passing(where, beams, poses, solid, stood, passed)
+    met = what_was_met(beams, laid, over.near, (is_new, is_gone), may_pass)
 
     valid = np.count_nonzero(beams.kind != INVALID, axis=1).astype(np.float64)
     valid[(valid == 0) | ~np.isfinite(poses).all(axis=1)] = np.nan
@@ -139,7 +139,7 @@ def _look(
         removed_share,
         opened,
         freshness_of(working, where, laid, beams.t_ns, passed, new, away, removed),
-        met=(BeamsMet(beams.t_ns, met_by),),
+        met=(BeamsMet(beams.t_ns, met),),
     )
     return changes, edits
 
