@@ -77,11 +77,17 @@ def dress(axes: Axes, x: str, y: str, size: float) -> None:
     axes.set_axisbelow(True)
 
 
-def legend(figure: Figure, handles: Iterable[object], size: float, columns: int) -> None:
-    """One legend under the axes, where it hides nothing."""
+def legend(
+    figure: Figure,
+    handles: Iterable[object],
+    size: float,
+    columns: int,
+    place: str = "outside lower center",
+) -> None:
+    """One legend under the axes, or at another place outside them, where it hides nothing."""
     figure.legend(
         handles=list(handles),
-        loc="outside lower center",
+        loc=place,
         ncols=columns,
         fontsize=size,
         frameon=False,

@@ -20,6 +20,7 @@ from slamreplay.geometry import se2
 from slamreplay.maps.grid import OccupancyGrid
 from slamreplay.report.figures import canvas
 from slamreplay.report.figures.canvas import APPEARED, BLUE, FAINT, INK, REMOVED, VERMILLION
+from slamreplay.report.figures.fitted import fit_plane
 
 _MARGIN_M = 2.5
 #: So many regions, the largest, bear their number; the others' would hide the map.
@@ -53,12 +54,8 @@ def map_figure(post: Postmortem, width_in: float) -> Figure | None:
     handles += _draw_parting(axes, post, size)
     handles += _draw_stops(axes, post, size)
     _draw_regions(axes, post, size)
-    columns = 2 if width_in < 5.0 else 4
-    canvas.legend(figure, handles, size, columns)
     # Equal axes leave the rest of their box empty: the paper is cut to what they need.
-    around = 0.7 + 0.022 * size * -(-len(handles) // columns)
-    plane = float(np.clip((width_in - 0.75) * aspect, 1.8, 6.6))
-    figure.set_size_inches(width_in, plane + around)
+    fit_plane(figure, aspect, handles, width_in)
     return figure
 
 
