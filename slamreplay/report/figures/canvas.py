@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from typing import Any
 
 import matplotlib as mpl
@@ -37,6 +38,20 @@ STATE_COLOURS = {
 
 #: Inches: a desktop column, the half of it beside the facts, and a phone.
 WIDE, BESIDE, NARROW = 11.0, 7.4, 3.9
+#: One column of a two-column page, and both of them: IEEE's templates have 3.5 and 7.16.
+COLUMN, PAGE = 3.5, 7.16
+
+
+@dataclass(frozen=True)
+class Part:
+    """One pair of axes of a panel: `draw(axes, size)` fills them and gives the legend's handles.
+
+    Axes may be anybody's: what is drawn in them depends on nothing around them.
+    """
+
+    name: str
+    draw: Callable[[Axes, float], list[object]]
+
 
 _STYLE: dict[Any, Any] = {
     "svg.hashsalt": "slamreplay",  # else ids are random
@@ -61,7 +76,7 @@ def new_figure(width_in: float, height_in: float) -> Figure:
 
 def text_size(width_in: float) -> float:
     """Points: smaller where the paper is."""
-    return 8.0 if width_in < 5.0 else 9.5
+    return 8.0 if width_in < 7.3 else 9.5
 
 
 def dress(axes: Axes, x: str, y: str, size: float) -> None:
@@ -75,6 +90,22 @@ def dress(axes: Axes, x: str, y: str, size: float) -> None:
         axes.spines[side].set_color(RULE)
     axes.grid(visible=True, color=RULE, linewidth=0.6, zorder=0)
     axes.set_axisbelow(True)
+
+
+def draw_parts(parts: Iterable[Part], every: Iterable[Axes], size: float) -> list[object]:
+    """Draw each part into its axes; the handles of all, each label once."""
+    found: dict[str, Any] = {}
+    for part, axes in zip(parts, every, strict=True):
+        for handle in part.draw(axes, size):
+            found.setdefault(handle.get_label(), handle)  # type: ignore[attr-defined]
+    return list(found.values())
+
+
+def stacked(every: Iterable[Axes]) -> None:
+    """Axes below each other over one abscissa: only the last names it."""
+    for axes in list(every)[:-1]:
+        axes.set_xlabel("")
+        axes.tick_params(labelbottom=False)
 
 
 def legend(figure: Figure, handles: Iterable[object], size: float, columns: int) -> None:
