@@ -6,11 +6,12 @@ import io
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure, SubFigure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
@@ -18,6 +19,9 @@ from matplotlib.transforms import Bbox
 from numpy.typing import NDArray
 
 from slamreplay.geometry.se2 import Array
+
+if TYPE_CHECKING:
+    import PIL.Image
 
 #: Okabe and Ito's colours, told apart with every common kind of colour blindness.
 BLUE, SKY, GREEN, YELLOW = "#0072B2", "#56B4E9", "#009E73", "#F0E442"
@@ -140,14 +144,27 @@ def svg_text(figure: Figure, *, dark: bool) -> str:
 
 def png_bytes(figure: Figure, dpi: int = 130) -> bytes:
     """The figure as PNG of 128 colours, a third of the size: same figure, same bytes."""
+    sink = io.BytesIO()
+    few_colours(pixels(figure, dpi)).save(sink, "png", optimize=True)
+    return sink.getvalue()
+
+
+def pixels(figure: Figure, dpi: int) -> PIL.Image.Image:
+    """The figure as an RGB picture."""
     from PIL import Image
 
     _settle(figure)
-    sink = io.BytesIO()
-    figure.savefig(sink, format="png", dpi=dpi)
-    picture, sink = Image.open(sink).convert("RGB"), io.BytesIO()
-    picture.quantize(128, dither=Image.Dither.NONE).save(sink, "png", optimize=True)
-    return sink.getvalue()
+    figure.set_dpi(dpi)
+    canvas: Any = FigureCanvasAgg(figure)
+    canvas.draw()
+    return Image.fromarray(np.asarray(canvas.buffer_rgba())[:, :, :3].copy())
+
+
+def few_colours(picture: PIL.Image.Image) -> PIL.Image.Image:
+    """The same picture in 128 colours, without dots between them."""
+    from PIL import Image
+
+    return picture.quantize(128, dither=Image.Dither.NONE)
 
 
 def _settle(figure: Figure) -> None:

@@ -10,10 +10,10 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from slamreplay import __version__
-from slamreplay.report.figures.canvas import FAINT, png_bytes, svg_bytes
+from slamreplay.report.figures.canvas import FAINT, few_colours, pixels, svg_bytes
 
 if TYPE_CHECKING:
-    from PIL.Image import Image
+    import PIL.Image
 
 #: Dots per inch: journals ask for 300 of line art in colour or grey.
 DPI = 300
@@ -32,7 +32,7 @@ def captioned_png(figure: Figure, title: str, caption: str, dpi: int = DPI) -> b
     """The PNG with the caption drawn below, and as text: Title, Description, Software."""
     from PIL import Image, PngImagePlugin
 
-    above = Image.open(io.BytesIO(png_bytes(figure, dpi))).convert("RGB")
+    above = pixels(figure, dpi)
     below = _written(caption, float(figure.get_size_inches()[0]), dpi)
     whole = Image.new("RGB", (above.width, above.height + below.height), "white")
     whole.paste(above, (0, 0))
@@ -45,17 +45,15 @@ def captioned_png(figure: Figure, title: str, caption: str, dpi: int = DPI) -> b
     ):
         info.add_itxt(key, value)  # UTF-8; tEXt has Latin-1 only
     sink = io.BytesIO()
-    small = whole.quantize(128, dither=Image.Dither.NONE)
-    small.save(sink, "png", optimize=True, dpi=(dpi, dpi), pnginfo=info)
+    few_colours(whole).save(sink, "png", optimize=True, dpi=(dpi, dpi), pnginfo=info)
     return sink.getvalue()
 
 
-def _written(text: str, width_in: float, dpi: int) -> Image:
+def _written(text: str, width_in: float, dpi: int) -> PIL.Image.Image:
     """A paragraph on paper of its own, as wide as the figure."""
-    from PIL import Image
-
     paper: Any = Figure(figsize=(width_in, 1.0), dpi=dpi, facecolor="white")
-    renderer: Any = FigureCanvasAgg(paper).get_renderer()
+    canvas: Any = FigureCanvasAgg(paper)
+    renderer = canvas.get_renderer()
     probe = paper.text(0.0, 0.0, "", fontsize=_SIZE, parse_math=False)
 
     def length_in(line: str) -> float:
@@ -70,9 +68,7 @@ def _written(text: str, width_in: float, dpi: int) -> Image:
     for row, line in enumerate(lines):
         y = 1.0 - (_MARGIN_IN + (row + 0.8) * step_in) / height_in
         paper.text(_MARGIN_IN / width_in, y, line, fontsize=_SIZE, color=FAINT, parse_math=False)
-    sink = io.BytesIO()
-    paper.savefig(sink, format="png", dpi=dpi)
-    return Image.open(sink).convert("RGB")
+    return pixels(paper, dpi)
 
 
 def wrapped(text: str, width_in: float, length_in: Any) -> list[str]:
