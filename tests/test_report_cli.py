@@ -78,6 +78,32 @@ def test_foreign_output_is_refused_before_any_work(app, bundle_folder, tmp_path)
     assert [p.name for p in tmp_path.iterdir()] == ["thesis.tex"]
 
 
+def test_figures_are_told_on_stderr_and_json_stays_the_report(app, bundle_folder, tmp_path):
+    figures = tmp_path / "r" / "figures"
+    result = run(app, "report", bundle_folder, "-o", tmp_path / "r", "--figures", figures, "--json")
+
+    assert result.exit_code == 0, result.output
+    assert result.stdout == (tmp_path / "r" / "report.json").read_text(encoding="utf-8")
+    told = [line.removeprefix("figure: ") for line in result.stderr.splitlines()]
+    assert str(figures / "map.png") in told
+    assert str(figures / "captions.md") in told
+    assert (figures / "map.svg").exists()
+
+
+@pytest.mark.parametrize("place", ["thesis", "r", "."])
+def test_figures_in_a_foreign_place_are_refused_before_any_work(
+    app, bundle_folder, tmp_path, place
+):
+    (tmp_path / "thesis").mkdir()
+    (tmp_path / "thesis" / "map.png").write_text("mine")
+
+    result = run(app, "report", bundle_folder, "-o", tmp_path / "r", "--figures", tmp_path / place)
+
+    assert isinstance(result.exception, OutputError if place == "thesis" else UsageError)
+    assert "figures" in str(result.exception)
+    assert [p.name for p in tmp_path.iterdir()] == ["thesis"]
+
+
 def test_bundle_takes_no_map(app, bundle_folder, tmp_path):
     result = run(app, "report", bundle_folder, "-o", tmp_path / "r", "--map", "m.yaml")
 

@@ -54,8 +54,13 @@ def atomic_folder(target: Path, *, marker: str) -> Iterator[Path]:
         raise
 
 
-def check_target(target: Path, marker: str) -> None:
+def check_target(target: Path, marker: str, option: str = "-o") -> None:
     """Refuse a place that cannot become a folder of ours, before any work is spent on it.
+
+    Args:
+        target: the folder to be.
+        marker: as of `atomic_folder`.
+        option: of the command line by which it was named, for the hint.
 
     Raises:
         OutputError: `target` exists and is neither empty nor known by `marker`, or the nearest
@@ -68,7 +73,7 @@ def check_target(target: Path, marker: str) -> None:
                 raise OutputError(
                     f"exists and holds no {marker}",
                     where=target,
-                    hint="name another output with -o",
+                    hint=f"name another output with {option}",
                 )
         above = next(p for p in target.absolute().parents if p.exists())
         if not above.is_dir():

@@ -58,6 +58,15 @@ UpdateMap = Annotated[
     ),
 ]
 
+Figures = Annotated[
+    Path | None,
+    typer.Option(
+        "--figures",
+        metavar="DIR",
+        help="Write each figure here as PNG and SVG for papers and tickets, with captions.",
+    ),
+]
+
 Trace = Annotated[
     float | None,
     typer.Option(
@@ -102,6 +111,7 @@ def _report(
     start_s: Start = None,
     end_s: End = None,
     update_map: UpdateMap = None,
+    figures: Figures = None,
     trace: Trace = None,
     hold_out: HoldOut = None,
     cause: Cause = True,
@@ -119,6 +129,10 @@ def _report(
         from slamreplay.report.map_proposal import check_proposal_target
 
         check_proposal_target(update_map)
+    if figures is not None:
+        from slamreplay.report.figure_files import check_figures_target
+
+        check_figures_target(figures, output)
     options = ingest_options(
         map_yaml=map_yaml,
         topics=topics,
@@ -152,12 +166,21 @@ def _report(
             page = write_report(post, output)
         if update_map is not None:
             _propose(post, update_map, map_yaml)
+        if figures is not None:
+            _draw(post, figures)
     if as_json:
         typer.echo(build(post).json_text(), nl=False)
     else:
         _summarise(post, page)
     if threshold is not None and any(f.severity in _from(threshold) for f in post.findings):
         raise typer.Exit(1)
+
+
+def _draw(post: Postmortem, target: Path) -> None:
+    from slamreplay.report.figure_files import write_figures
+
+    for path in write_figures(post, target):
+        typer.echo(f"figure: {path}", err=True)
 
 
 def _propose(post: Postmortem, target: Path, original: Path | None) -> None:

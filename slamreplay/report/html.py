@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import base64
 import hashlib
-from collections.abc import Callable
 from dataclasses import dataclass
 from importlib.resources import files
 
@@ -14,16 +13,8 @@ from matplotlib.figure import Figure
 
 from slamreplay.evidence.clean import clean
 from slamreplay.evidence.result import Postmortem
-from slamreplay.report.designs import design_of
-from slamreplay.report.dose_tables import words_of
 from slamreplay.report.figures import canvas
-from slamreplay.report.figures.consistency import consistency_figure
-from slamreplay.report.figures.course import course_figure
-from slamreplay.report.figures.covariance import covariance_figure
-from slamreplay.report.figures.doses import doses_figure
-from slamreplay.report.figures.graph import graph_figure
-from slamreplay.report.figures.map import map_figure
-from slamreplay.report.figures.reliability import reliability_figure
+from slamreplay.report.figures.panels import PANELS
 from slamreplay.report.page import Page, page
 from slamreplay.report.phrases import bound
 from slamreplay.report.sections import sections
@@ -89,43 +80,23 @@ def _hash(text: str) -> str:
 
 def _pictures(post: Postmortem, view: Page) -> dict[str, Picture | None]:
     return {
-        "map": _picture(post, map_figure, canvas.BESIDE, view.map_alt),
-        "course": _picture(post, course_figure, canvas.WIDE, view.course_alt),
-        "covariance": _picture(post, covariance_figure, canvas.WIDE, view.covariance_alt),
-        "consistency": _picture(post, _consistency, canvas.WIDE, view.consistency_alt),
-        "doses": _picture(post, _doses, canvas.WIDE, view.design_alt),
-        "graph": _picture(post, _graph, canvas.BESIDE, view.graph_alt),
-        "reliability": _picture(post, _reliability, canvas.BESIDE, view.reliability_alt),
+        "map": _picture(post, "map", canvas.BESIDE, view.map_alt),
+        "course": _picture(post, "course", canvas.WIDE, view.course_alt),
+        "covariance": _picture(post, "covariance", canvas.WIDE, view.covariance_alt),
+        "consistency": _picture(post, "consistency", canvas.WIDE, view.consistency_alt),
+        "doses": _picture(post, "doses", canvas.WIDE, view.design_alt),
+        "graph": _picture(post, "graph", canvas.BESIDE, view.graph_alt),
+        "reliability": _picture(post, "reliability", canvas.BESIDE, view.reliability_alt),
     }
 
 
-def _picture(
-    post: Postmortem, draw: Callable[[Postmortem, float], Figure | None], width_in: float, alt: str
-) -> Picture | None:
+def _picture(post: Postmortem, name: str, width_in: float, alt: str) -> Picture | None:
+    draw = PANELS[name].figure
     with canvas.plain_style():
         wide, narrow = draw(post, width_in), draw(post, canvas.NARROW)
         if wide is None or narrow is None:
             return None
         return Picture(_uri(wide, spaced=True), _uri(narrow, spaced=False), alt)
-
-
-def _consistency(post: Postmortem, width_in: float) -> Figure | None:
-    return consistency_figure(post.consistency, width_in)
-
-
-def _doses(post: Postmortem, width_in: float) -> Figure | None:
-    results = design_of(post)
-    if results is None or not any(curve.responses for curve in results.curves):
-        return None
-    return doses_figure(results, words_of(results), width_in)
-
-
-def _graph(post: Postmortem, width_in: float) -> Figure | None:
-    return None if post.slam is None else graph_figure(post.slam, width_in)
-
-
-def _reliability(post: Postmortem, width_in: float) -> Figure | None:
-    return reliability_figure(post.reliability, width_in, post.judgement.confidence)
 
 
 def _uri(figure: Figure, *, spaced: bool) -> Markup:

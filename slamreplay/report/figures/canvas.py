@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, Literal, TYPE_CHECKING
 
 import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure, SubFigure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
@@ -17,6 +19,9 @@ from matplotlib.transforms import Bbox
 from numpy.typing import NDArray
 
 from slamreplay.geometry.se2 import Array
+
+if TYPE_CHECKING:
+    import PIL.Image
 
 #: Okabe and Ito's colours, told apart with every common kind of colour blindness.
 BLUE, SKY, GREEN, YELLOW = "#0072B2", "#56B4E9", "#009E73", "#F0E442"
@@ -37,6 +42,20 @@ STATE_COLOURS = {
 
 #: Inches: a desktop column, the half of it beside the facts, and a phone.
 WIDE, BESIDE, NARROW = 11.0, 7.4, 3.9
+#: One column of a two-column page, and both of them: IEEE's templates have 3.5 and 7.16.
+COLUMN, PAGE = 3.5, 7.16
+
+
+@dataclass(frozen=True)
+class Part:
+    """One pair of axes of a panel: `draw(axes, size)` fills them and gives the legend's handles.
+
+    Axes may be anybody's: what is drawn in them depends on nothing around them.
+    """
+
+    name: str
+    draw: Callable[[Axes, float], list[object]]
+
 
 _STYLE: dict[Any, Any] = {
     "svg.hashsalt": "slamreplay",  # else ids are random
@@ -61,7 +80,7 @@ def new_figure(width_in: float, height_in: float) -> Figure:
 
 def text_size(width_in: float) -> float:
     """Points: smaller where the paper is."""
-    return 8.0 if width_in < 5.0 else 9.5
+    return 8.0 if width_in < 7.3 else 9.5
 
 
 def dress(axes: Axes, x: str, y: str, size: float) -> None:
@@ -77,12 +96,28 @@ def dress(axes: Axes, x: str, y: str, size: float) -> None:
     axes.set_axisbelow(True)
 
 
+def draw_parts(parts: Iterable[Part], every: Iterable[Axes], size: float) -> list[object]:
+    """Draw each part into its axes; the handles of all, each label once."""
+    found: dict[str, Any] = {}
+    for part, axes in zip(parts, every, strict=True):
+        for handle in part.draw(axes, size):
+            found.setdefault(handle.get_label(), handle)  # type: ignore[attr-defined]
+    return list(found.values())
+
+
+def stacked(every: Iterable[Axes]) -> None:
+    """Axes below each other over one abscissa: only the last names it."""
+    for axes in list(every)[:-1]:
+        axes.set_xlabel("")
+        axes.tick_params(labelbottom=False)
+
+
 def legend(
     figure: Figure,
     handles: Iterable[object],
     size: float,
     columns: int,
-    place: str = "outside lower center",
+    place: Literal["outside lower center", "outside right upper"] = "outside lower center",
 ) -> None:
     """One legend under the axes, or at another place outside them, where it hides nothing."""
     figure.legend(
@@ -115,14 +150,27 @@ def svg_text(figure: Figure, *, dark: bool) -> str:
 
 def png_bytes(figure: Figure, dpi: int = 130) -> bytes:
     """The figure as PNG of 128 colours, a third of the size: same figure, same bytes."""
+    sink = io.BytesIO()
+    few_colours(pixels(figure, dpi)).save(sink, "png", optimize=True)
+    return sink.getvalue()
+
+
+def pixels(figure: Figure, dpi: int) -> PIL.Image.Image:
+    """The figure as an RGB picture."""
     from PIL import Image
 
     _settle(figure)
-    sink = io.BytesIO()
-    figure.savefig(sink, format="png", dpi=dpi)
-    picture, sink = Image.open(sink).convert("RGB"), io.BytesIO()
-    picture.quantize(128, dither=Image.Dither.NONE).save(sink, "png", optimize=True)
-    return sink.getvalue()
+    figure.set_dpi(dpi)
+    canvas: Any = FigureCanvasAgg(figure)
+    canvas.draw()
+    return Image.fromarray(np.asarray(canvas.buffer_rgba())[:, :, :3].copy())
+
+
+def few_colours(picture: PIL.Image.Image) -> PIL.Image.Image:
+    """The same picture in 128 colours, without dots between them."""
+    from PIL import Image
+
+    return picture.quantize(128, dither=Image.Dither.NONE)
 
 
 def _settle(figure: Figure) -> None:

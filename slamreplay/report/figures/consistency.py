@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -13,7 +15,7 @@ from slamreplay.consistency.belief.summary import ConsistencySummary
 from slamreplay.consistency.statistics.distribution import LEVELS, Distribution
 from slamreplay.consistency.statistics.mean_test import NOMINAL
 from slamreplay.report.figures import canvas
-from slamreplay.report.figures.canvas import BLUE, FAINT, SKY, VERMILLION
+from slamreplay.report.figures.canvas import BLUE, FAINT, SKY, VERMILLION, Part
 
 #: One colour for each part of a pose, and a dash of its own beside it.
 _LINES = ((BLUE, "-"), (VERMILLION, (0, (4, 1.6))))
@@ -28,26 +30,39 @@ def consistency_figure(summaries: tuple[ConsistencySummary, ...], width_in: floa
         summaries: sources, the best first.
         width_in: of the paper.
     """
-    drawn = drawn_parts(summaries)
-    if not drawn:
+    parts = consistency_parts(summaries)
+    if not parts:
         return None
     narrow, size = width_in < 5.0, canvas.text_size(width_in)
-    count = len(drawn) + 1
+    count = len(parts)
     if narrow:
         figure = canvas.new_figure(width_in, 0.6 + 2.5 * count)
         panels = list(figure.subplots(count, 1, squeeze=False)[:, 0])
     else:
         figure = canvas.new_figure(width_in, 4.0)
         panels = list(figure.subplots(1, count, squeeze=False)[0])
-    for panel, (name, found), (colour, _) in zip(panels, drawn, _LINES, strict=False):
-        _draw_histogram(panel, name, found, colour, size)
-    handles = _draw_coverage(panels[-1], drawn, size)
-    handles += [
+    handles = canvas.draw_parts(parts, panels, size)
+    canvas.legend(figure, handles, size, columns=1 if narrow else len(handles))
+    return figure
+
+
+def consistency_parts(summaries: tuple[ConsistencySummary, ...]) -> tuple[Part, ...]:
+    """A histogram for each part of the first source's pose, and coverage; nothing without any."""
+    drawn = drawn_parts(summaries)
+    if not drawn:
+        return ()
+    histograms = [
+        Part(f"pit_{name.replace(' ', '_')}", partial(_draw_histogram, name, found, colour))
+        for (name, found), (colour, _) in zip(drawn, _LINES, strict=False)
+    ]
+    return (*histograms, Part("coverage", partial(_draw_coverage, drawn)))
+
+
+def _expected() -> list[object]:
+    return [
         Patch(color=SKY, alpha=0.3, label="95 % of consistent beliefs lie within"),
         Line2D([], [], color=FAINT, ls="--", lw=1.0, label="what the covariance says"),
     ]
-    canvas.legend(figure, handles, size, columns=1 if narrow else len(handles))
-    return figure
 
 
 def drawn_parts(summaries: tuple[ConsistencySummary, ...]) -> list[tuple[str, Distribution]]:
@@ -67,7 +82,9 @@ def bar_band(bars: int, n_eff: float) -> tuple[float, float]:
     return float(low), float(high)
 
 
-def _draw_histogram(axes: Axes, name: str, found: Distribution, colour: str, size: float) -> None:
+def _draw_histogram(
+    name: str, found: Distribution, colour: str, axes: Axes, size: float
+) -> list[object]:
     canvas.dress(axes, f"{name}: F(NEES) [1]", "updates [share]", size)
     bars = _BARS if found.n_eff >= _FEW else _FEW_BARS
     counts, edges = np.histogram(found.pit, bars, (0.0, 1.0))
@@ -78,9 +95,10 @@ def _draw_histogram(axes: Axes, name: str, found: Distribution, colour: str, siz
     axes.axhline(1.0 / bars, color=FAINT, linestyle="--", linewidth=1.0, zorder=3)
     axes.set_xlim(0.0, 1.0)
     axes.set_ylim(0.0, 1.12 * max(high, float(share.max())))
+    return _expected()
 
 
-def _draw_coverage(axes: Axes, drawn: list[tuple[str, Distribution]], size: float) -> list[object]:
+def _draw_coverage(drawn: list[tuple[str, Distribution]], axes: Axes, size: float) -> list[object]:
     canvas.dress(axes, "claimed by the ellipse [share]", "held by the ellipse [share]", size)
     claimed = np.linspace(0.0, 1.0, 201)
     most = max(found.most for _, found in drawn)  # of the part with the fewest samples
@@ -95,4 +113,4 @@ def _draw_coverage(axes: Axes, drawn: list[tuple[str, Distribution]], size: floa
         handles.append(Line2D([], [], color=colour, ls=dash, marker="o", ms=4, lw=1.5, label=name))
     axes.set_xlim(0.0, 1.0)
     axes.set_ylim(0.0, 1.03)
-    return handles
+    return [*handles, *_expected()]

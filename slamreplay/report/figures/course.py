@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -11,40 +14,62 @@ from matplotlib.patches import Patch
 from slamreplay.evidence.result import Postmortem
 from slamreplay.evidence.words import STATES
 from slamreplay.report.figures import canvas
-from slamreplay.report.figures.canvas import APPEARED, BLUE, FAINT, INK, REMOVED, STATE_COLOURS
+from slamreplay.report.figures.canvas import (
+    APPEARED,
+    BLUE,
+    FAINT,
+    INK,
+    REMOVED,
+    STATE_COLOURS,
+    Part,
+)
 
 
 def course_figure(post: Postmortem, width_in: float) -> Figure | None:
     """Error over time with state bands and the share of changed beams; None without either."""
-    changes = None if post.hindsight is None else post.hindsight.changes
-    rows = ([] if post.error is None else [_distance, _heading]) + (
-        [] if changes is None else [_changed]
-    )
-    if not rows:
+    parts = course_parts(post)
+    if not parts:
         return None
     size = canvas.text_size(width_in)
-    figure = canvas.new_figure(width_in, 1.75 * len(rows) + 0.9)
-    every = figure.subplots(len(rows), 1, sharex=True, squeeze=False)[:, 0]
+    row_in = 1.75 if width_in > canvas.COLUMN else 1.2  # a column of a paper is short, too
+    figure = canvas.new_figure(width_in, row_in * len(parts) + 0.9)
+    every = figure.subplots(len(parts), 1, sharex=True, squeeze=False)[:, 0]
+    handles = canvas.draw_parts(parts, every, size)
+    canvas.stacked(every)
+    canvas.legend(figure, handles, size, columns=2 if width_in < 5.0 else 5)
+    return figure
+
+
+def course_parts(post: Postmortem) -> tuple[Part, ...]:
+    """Distance, heading and changed beams over time, as far as they are known."""
+    rows: dict[str, Callable[[Axes, Postmortem], str]] = {}
+    if post.error is not None:
+        rows |= {"error": _distance, "heading": _heading}
+    if post.hindsight is not None and post.hindsight.changes is not None:
+        rows["changed_beams"] = _changed
+    return tuple(Part(name, partial(_draw, post, draw)) for name, draw in rows.items())
+
+
+def _draw(
+    post: Postmortem, curve: Callable[[Axes, Postmortem], str], axes: Axes, size: float
+) -> list[object]:
     end_s = float(post.seconds(np.int64(post.manifest.end_ns)))
-    for axes, draw in zip(every, rows, strict=True):
-        last = axes is every[-1]
-        canvas.dress(axes, "time since start [s]" if last else "", draw(axes, post), size)
-        axes.set_xlim(0.0, max(end_s, 1e-3))
-        _bands(axes, post)
+    canvas.dress(axes, "time since start [s]", curve(axes, post), size)
+    axes.set_xlim(0.0, max(end_s, 1e-3))
+    _bands(axes, post)
     seen = dict.fromkeys(i.state for i in post.judgement.intervals)
     handles: list[object] = [
         Patch(color=STATE_COLOURS[s], alpha=0.35, label=STATES[s].name) for s in seen
     ]
     handles.append(Line2D([], [], color=INK, ls="--", lw=1.0, label="limit"))
-    if changes is not None:
+    if curve is _changed:
         handles += [
             Patch(facecolor=APPEARED, edgecolor=FAINT, lw=0.6, label="stands there, not mapped"),
             Patch(facecolor=REMOVED, edgecolor=FAINT, lw=0.6, label="mapped, but gone"),
         ]
     if post.judgement.stops:
         handles.append(Line2D([], [], color=INK, ls=":", lw=1.2, label="unplanned stop"))
-    canvas.legend(figure, handles, size, columns=2 if width_in < 5.0 else 5)
-    return figure
+    return handles
 
 
 def _bands(axes: Axes, post: Postmortem) -> None:

@@ -14,7 +14,7 @@ from slamreplay.bundle.track import PoseTrack
 from slamreplay.evidence.result import Postmortem
 from slamreplay.geometry import se2
 from slamreplay.report.figures import canvas
-from slamreplay.report.figures.canvas import BLUE, FAINT, INK, ORANGE, SKY, VERMILLION
+from slamreplay.report.figures.canvas import BLUE, FAINT, INK, ORANGE, SKY, VERMILLION, Part
 
 _SIGMAS = 3.0
 _ELLIPSES = 24
@@ -40,14 +40,13 @@ def sigma_position_m(belief: PoseTrack) -> se2.Array:
 
 def covariance_figure(post: Postmortem, width_in: float) -> Figure | None:
     """Ellipses along the path, claimed against real error, and NEES; None without covariance."""
-    belief, rows = post.belief, claimed(post.belief)
-    if belief is None or not rows.any():
+    parts = covariance_parts(post)
+    if not parts:
         return None
     narrow = width_in < 5.0
     size = canvas.text_size(width_in)
-    has_nees = post.nees is not None and bool(np.isfinite(post.nees.joint).any())
-    figure = canvas.new_figure(width_in, (8.6 if has_nees else 6.4) if narrow else 5.0)
-    curves = 2 if has_nees else 1
+    curves = len(parts) - 1
+    figure = canvas.new_figure(width_in, (8.6 if curves == 2 else 6.4) if narrow else 5.0)
     if narrow:
         axes = figure.subplots(1 + curves, 1, height_ratios=[1.5] + [1.0] * curves)
         plane, time = axes[0], list(axes[1:])
@@ -57,33 +56,44 @@ def covariance_figure(post: Postmortem, width_in: float) -> Figure | None:
         left, right = list(figure.subfigures(1, 2, width_ratios=[1.0, 1.35], squeeze=False)[0])
         plane = left.subplots()
         time = list(right.subplots(curves, 1, sharex=True, squeeze=False)[:, 0])
-    _draw_ellipses(plane, post, belief, rows, size)
-    handles = _draw_claim(time[0], post, belief, size)
-    if has_nees:
-        handles += _draw_nees(time[1], post, size)
-    time[-1].set_xlabel("time since start [s]", fontsize=size, color=INK)
-    end_s = float(post.seconds(np.int64(post.manifest.end_ns)))
-    time[-1].set_xlim(0.0, max(end_s, 1e-3))
-    handles = [
-        Patch(
-            facecolor=to_rgba(ORANGE, 0.08), edgecolor=ORANGE, label="3-sigma ellipse of the belief"
-        ),
-        *handles,
-    ]
-    canvas.legend(figure, handles, size, columns=1 if narrow else 5)
+    handles = canvas.draw_parts(parts, [plane, *time], size)
+    canvas.stacked(time)
+    canvas.legend(figure, handles, size, columns=1 if narrow else 3)
     return figure
+
+
+def covariance_parts(post: Postmortem) -> tuple[Part, ...]:
+    """Ellipses along the path, sigma and NEES over time; nothing without a covariance."""
+    belief, rows = post.belief, claimed(post.belief)
+    if belief is None or not rows.any():
+        return ()
+    parts = [
+        Part("ellipses", lambda axes, size: _draw_ellipses(axes, post, belief, rows, size)),
+        Part("sigma", lambda axes, size: _draw_claim(axes, post, belief, size)),
+    ]
+    if post.nees is not None and np.isfinite(post.nees.joint).any():
+        parts.append(Part("nees", lambda axes, size: _draw_nees(axes, post, size)))
+    return tuple(parts)
 
 
 def _draw_ellipses(
     axes: Axes, post: Postmortem, belief: PoseTrack, rows: NDArray[np.bool_], size: float
-) -> None:
+) -> list[object]:
     """Equal times apart, so that standing still does not hide the rest."""
     canvas.dress(axes, "x in map [m]", "y in map [m]", size)
     axes.set_aspect("equal", adjustable="datalim")
+    handles: list[object] = [
+        Patch(
+            facecolor=to_rgba(ORANGE, 0.08), edgecolor=ORANGE, label="3-sigma ellipse of the belief"
+        ),
+        Line2D([], [], color=VERMILLION, lw=1.2, ls=(0, (4, 1.6)), label="believed path"),
+    ]
     reference = post.reference
     if reference is not None and reference.has_pose.any():
         xy = canvas.strided(reference.xyyaw)
         axes.plot(xy[:, 0], xy[:, 1], color=BLUE, linewidth=1.4, zorder=2)
+        kind = (post.reference_kind or "reference").replace("_", " ")
+        handles.append(Line2D([], [], color=BLUE, lw=1.4, label=f"path by {kind}"))
     xy = canvas.strided(belief.xyyaw)
     axes.plot(xy[:, 0], xy[:, 1], color=VERMILLION, lw=1.2, ls=(0, (4, 1.6)), zorder=3)
     known = np.flatnonzero(rows)
@@ -103,10 +113,17 @@ def _draw_ellipses(
             zorder=4,
         )
         axes.add_patch(ellipse)
+    return handles
+
+
+def _dress_time(axes: Axes, post: Postmortem, y: str, size: float) -> None:
+    canvas.dress(axes, "time since start [s]", y, size)
+    end_s = float(post.seconds(np.int64(post.manifest.end_ns)))
+    axes.set_xlim(0.0, max(end_s, 1e-3))
 
 
 def _draw_claim(axes: Axes, post: Postmortem, belief: PoseTrack, size: float) -> list[object]:
-    canvas.dress(axes, "", "position [m]", size)
+    _dress_time(axes, post, "position [m]", size)
     t = post.seconds(belief.t_ns)
     s, high = canvas.thinned(t, _SIGMAS * sigma_position_m(belief))
     axes.fill_between(s, 0.0, high, color=ORANGE, alpha=0.35, linewidth=0.0, zorder=2)
@@ -123,7 +140,7 @@ def _draw_claim(axes: Axes, post: Postmortem, belief: PoseTrack, size: float) ->
 def _draw_nees(axes: Axes, post: Postmortem, size: float) -> list[object]:
     nees = post.nees
     assert nees is not None
-    canvas.dress(axes, "", "NEES of x, y, yaw [1]", size)
+    _dress_time(axes, post, "NEES of x, y, yaw [1]", size)
     floor = 1e-2
     summary = nees.summary().test
     s, value = canvas.thinned(post.seconds(nees.t_ns), nees.joint)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from functools import partial
 from statistics import median
 from textwrap import fill
 
@@ -26,12 +27,12 @@ from slamreplay.report.figures.canvas import (
     PURPLE,
     SKY,
     VERMILLION,
+    Part,
 )
 
 #: A level to its place on the axis.
 Place = Callable[[float], float]
 
-_SIZE = 9.5
 _COLUMNS = 3
 _LOOKS = [(BLUE, "o"), (VERMILLION, "s"), (GREEN, "D"), (PURPLE, "^"), (ORANGE, "v"), (SKY, "P")]
 #: Letters in a line of what a level does: no wider than its panel.
@@ -50,31 +51,46 @@ def doses_figure(results: DoseResults, words: dict[str, str], width_in: float = 
         words: by `NAME.VARIANT`, what the level does, in a few words.
         width_in: of the paper; narrow paper has one panel a row.
     """
-    limit = results.limits[0]
-    panels = _panels(results.curves)
-    columns = 1 if width_in < 5.0 else min(_COLUMNS, len(panels))
-    rows = -(-len(panels) // columns)
+    parts = dose_parts(results, words)
+    size = canvas.text_size(width_in)
+    columns = min(1 if width_in < 5.0 else 2 if width_in < 9.0 else _COLUMNS, len(parts))
+    rows = -(-len(parts) // columns)
     figure = canvas.new_figure(width_in, 0.7 + 3.1 * rows)
     every = figure.subplots(rows, columns, squeeze=False).ravel()
+    handles = canvas.draw_parts(parts, every[: len(parts)], size)
+    for k, axes in enumerate(every):
+        if k >= len(parts):
+            axes.set_visible(False)
+        elif k % columns:
+            axes.set_ylabel("")
+    canvas.legend(figure, handles, size, 1 if width_in < 5.0 else 3)
+    return figure
+
+
+def dose_parts(results: DoseResults, words: dict[str, str]) -> tuple[Part, ...]:
+    """A part for each perturbation, as `doses_figure` has them."""
+    limit = results.limits[0]
     names = list(dict.fromkeys(curve.estimator for curve in results.curves))
     looks = {name: _LOOKS[k % len(_LOOKS)] for k, name in enumerate(names)}
     top = _top(results.curves, limit)
-    told = {c.perturbation: fill(words.get(c.perturbation, ""), _WORDS) for p in panels for c in p}
-    for k, axes in enumerate(every):
-        if k >= len(panels):
-            axes.set_visible(False)
-            continue
-        _panel(axes, panels[k], limit, looks, top)
-        first = panels[k][0]
-        axes.set_title(first.perturbation, loc="left", fontsize=_SIZE + 1, color=INK,
-                       weight="bold",
-                       pad=20 + 11 * told[first.perturbation].count("\n"))  # fmt: skip
-        axes.text(0.0, 1.02, told[first.perturbation], transform=axes.transAxes,
-                  fontsize=_SIZE - 1.5, color=FAINT, va="bottom", in_layout=False)  # fmt: skip
-        if k % columns:
-            axes.set_ylabel("")
-    canvas.legend(figure, _handles(looks, limit, results), _SIZE, 1 if columns == 1 else 3)
-    return figure
+
+    def draw(curves: list[DoseCurve], axes: Axes, size: float) -> list[object]:
+        name = curves[0].perturbation
+        told = fill(words.get(name, ""), _WORDS)
+        _panel(axes, curves, limit, looks, top, size)
+        axes.set_title(name, loc="left", fontsize=size + 1, color=INK, weight="bold",
+                       pad=20 + 11 * told.count("\n"))  # fmt: skip
+        axes.text(0.0, 1.02, told, transform=axes.transAxes,
+                  fontsize=size - 1.5, color=FAINT, va="bottom", in_layout=False)  # fmt: skip
+        return _handles(looks, limit, results)
+
+    return tuple(
+        Part(_part_name(curves), partial(draw, curves)) for curves in _panels(results.curves)
+    )
+
+
+def _part_name(curves: Sequence[DoseCurve]) -> str:
+    return f"{curves[0].perturbation}{'_below' if _is_below(curves[0]) else ''}"
 
 
 def _panels(curves: Sequence[DoseCurve]) -> list[list[DoseCurve]]:
@@ -101,9 +117,10 @@ def _panel(
     limit: Limit,
     looks: dict[str, tuple[str, str]],
     top: float,
+    size: float,
 ) -> None:
     unit = curves[0].unit
-    canvas.dress(axes, f"level [{unit}]", _label(limit), _SIZE)
+    canvas.dress(axes, f"level [{unit}]", response_label(limit), size)
     place = _place_of(curves)
     for k, curve in enumerate(curves):
         colour, marker = looks[curve.estimator]
@@ -242,7 +259,8 @@ def _mark_at(limit: Limit, top: float, k: int) -> float:
     return reach * (0.88 - 0.13 * k)
 
 
-def _label(limit: Limit) -> str:
+def response_label(limit: Limit) -> str:
+    """What the first limit is of, with its unit: the ordinate."""
     name, _, unit = limit.metric.rpartition("_")
     is_unit = unit in ("m", "s", "deg", "rad")
     said, above, _ = limit.title.rpartition(" above ")

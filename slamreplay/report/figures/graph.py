@@ -11,9 +11,10 @@ from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
 from slamreplay.estimators.pose_graph.product import MapAndGraph
+from slamreplay.evidence.result import Postmortem
 from slamreplay.geometry import se2
 from slamreplay.report.figures import canvas
-from slamreplay.report.figures.canvas import BLUE, GREEN, INK, VERMILLION
+from slamreplay.report.figures.canvas import BLUE, GREEN, INK, VERMILLION, Part
 
 #: Edge of a cell that beams are counted in, m; so many of them make a wall.
 CELL_M, WALL_HITS = 0.05, 4.0
@@ -31,13 +32,29 @@ def graph_figure(made: MapAndGraph, width_in: float) -> Figure:
         width_in: width of the paper, inches.
     """
     size = canvas.text_size(width_in)
+    figure = canvas.new_figure(width_in, width_in)
+    axes = figure.add_subplot()
+    handles = draw_graph(axes, made, size)
+    aspect = np.ptp(axes.get_ylim()) / np.ptp(axes.get_xlim())
+    figure.set_size_inches(width_in, float(np.clip(width_in * aspect, 2.5, 14.0)) + 0.6)
+    canvas.legend(figure, handles, size, 3)
+    return figure
+
+
+def graph_parts(post: Postmortem) -> tuple[Part, ...]:
+    """The map of the pose graph; nothing where none ran."""
+    made = post.slam
+    if made is None:
+        return ()
+    return (Part("graph", lambda axes, size: draw_graph(axes, made, size)),)
+
+
+def draw_graph(axes: Axes, made: MapAndGraph, size: float = 9.5) -> list[object]:
+    """Draw it into axes; the handles of a legend."""
     xy = made.node_xyyaw[:, :2]
     low, high = xy.min(axis=0) - FARTHEST_M, xy.max(axis=0) + FARTHEST_M
     inside = made.points[((made.points > low) & (made.points < high)).all(axis=1)]
     hits, low, high = _counted(inside if len(inside) else xy)
-    aspect = (high[1] - low[1]) / (high[0] - low[0])
-    figure = canvas.new_figure(width_in, float(np.clip(width_in * aspect, 2.5, 14.0)) + 0.6)
-    axes = figure.add_subplot()
     ink = LinearSegmentedColormap.from_list("ink", ["#ffffff", INK])
     extent = (low[0], high[0], low[1], high[1])
     axes.imshow(hits, origin="lower", extent=extent, cmap=ink, vmin=0.0, vmax=1.0, zorder=1)
@@ -47,13 +64,11 @@ def graph_figure(made: MapAndGraph, width_in: float) -> Figure:
     taken, not_taken = made.closures[made.accepted], made.closures[~made.accepted]
     _draw_links(axes, xy, not_taken, VERMILLION, ":")
     _draw_links(axes, xy, taken, GREEN, "-")
-    handles = [
+    return [
         Line2D([], [], color=BLUE, lw=1.2, label=_count(len(xy), "node")),
         Line2D([], [], color=GREEN, lw=1.6, label=_count(len(taken), "loop closure")),
         Line2D([], [], color=VERMILLION, lw=1.2, ls=":", label=f"{len(not_taken)} rejected"),
     ]
-    canvas.legend(figure, list(handles), size, 3)
-    return figure
 
 
 def _count(number: int, what: str) -> str:

@@ -19,7 +19,15 @@ from slamreplay.evidence.result import Postmortem
 from slamreplay.geometry import se2
 from slamreplay.maps.grid import OccupancyGrid
 from slamreplay.report.figures import canvas
-from slamreplay.report.figures.canvas import APPEARED, BLUE, FAINT, INK, REMOVED, VERMILLION
+from slamreplay.report.figures.canvas import (
+    APPEARED,
+    BLUE,
+    FAINT,
+    INK,
+    REMOVED,
+    VERMILLION,
+    Part,
+)
 from slamreplay.report.figures.fitted import fit_plane
 
 _MARGIN_M = 2.5
@@ -29,21 +37,44 @@ _NAMED = 6
 
 def map_figure(post: Postmortem, width_in: float) -> Figure | None:
     """Believed and hindsight path on the map; None where no path is known at all."""
-    post = _in_last_map(post)
-    paths = [p for p in (_path(post, "hindsight"), _path(post, "belief")) if p is not None]
-    alone = _path(post, "odometry") if not paths else None
-    if alone is not None:
-        paths = [alone]
-    if not paths:
+    if not map_parts(post):
         return None
-    low, high = _window(post, paths)
     size = canvas.text_size(width_in)
-    aspect = (high[1] - low[1]) / (high[0] - low[0])
     figure = canvas.new_figure(width_in, width_in)
     axes = figure.add_subplot()
+    handles = draw_map(axes, post, size)
+    # Equal axes leave the rest of their box empty: the paper is cut to what they need.
+    fit_plane(figure, np.ptp(axes.get_ylim()) / np.ptp(axes.get_xlim()), handles, width_in)
+    return figure
+
+
+def map_parts(post: Postmortem) -> tuple[Part, ...]:
+    """The map; nothing where no path is known."""
+    if _paths(_in_last_map(post)) is None:
+        return ()
+    return (Part("map", lambda axes, size: draw_map(axes, post, size)),)
+
+
+def draw_map(axes: Axes, post: Postmortem, size: float = 9.5) -> list[object]:
+    """Draw both paths on the map, where they part, the stops and the regions.
+
+    Args:
+        axes: to draw in; their limits and aspect are set.
+        post: with a path at least.
+        size: of the text, points.
+
+    Returns:
+        Handles for a legend.
+    """
+    post = _in_last_map(post)
+    found = _paths(post)
+    if found is None:
+        return []
+    paths, alone = found
+    low, high = _window(post, paths)
     handles: list[object] = []
     if post.grid is not None and alone is None:
-        handles += _draw_map(axes, post, post.grid, low, high)
+        handles += _draw_grid(axes, post, post.grid, low, high)
     frame = post.manifest.frames.odom if alone is not None else post.manifest.frames.map
     frame = frame or ("odom" if alone is not None else "map")
     canvas.dress(axes, f"x in {frame} [m]", f"y in {frame} [m]", size)
@@ -54,9 +85,16 @@ def map_figure(post: Postmortem, width_in: float) -> Figure | None:
     handles += _draw_parting(axes, post, size)
     handles += _draw_stops(axes, post, size)
     _draw_regions(axes, post, size)
-    # Equal axes leave the rest of their box empty: the paper is cut to what they need.
-    fit_plane(figure, aspect, handles, width_in)
-    return figure
+    return handles
+
+
+def _paths(post: Postmortem) -> tuple[list[se2.Array], se2.Array | None] | None:
+    """What is drawn, and odometry's path where that is all there is; None without any."""
+    paths = [p for p in (_path(post, "hindsight"), _path(post, "belief")) if p is not None]
+    if paths:
+        return paths, None
+    alone = _path(post, "odometry")
+    return None if alone is None else ([alone], alone)
 
 
 def _in_last_map(post: Postmortem) -> Postmortem:
@@ -114,7 +152,7 @@ def _regions(post: Postmortem) -> list[ChangedRegion]:
     return [] if changes is None else list(changes.regions)
 
 
-def _draw_map(
+def _draw_grid(
     axes: Axes, post: Postmortem, grid: OccupancyGrid, low: se2.Array, high: se2.Array
 ) -> list[object]:
     corners = np.array([low, [low[0], high[1]], high, [high[0], low[1]]])
