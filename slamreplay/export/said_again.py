@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from slamreplay.ingest.log_lines import told
+from slamreplay.ingest.log_lines import told_of
 
 #: Lines of navigations, by name and status.
 _NAVIGATIONS = {
@@ -38,7 +38,7 @@ def said_again(node: str, line: str, new_node: str, new_name: Callable[[str], st
         new_node: what that node is called now.
         new_name: gives a recovery its other name.
     """
-    meant = told(node, line)
+    meant = told_of(node, line)
     if meant is None:
         return None
     name, status = meant[0], meant[1]
@@ -48,4 +48,4 @@ def said_again(node: str, line: str, new_node: str, new_name: Callable[[str], st
         lines += [f"{new[0]} behavior started", f"Received request to {new[0]}"]
         lines.append(f"{new[0].capitalize()} to unstuck robot")
     lines.append(_BEHAVIOURS.get(status, "{}").format(new[0]))
-    return next((text for text in lines if text and told(new_node, text) == new), None)
+    return next((text for text in lines if text and told_of(new_node, text) == new), None)

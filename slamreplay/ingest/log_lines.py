@@ -45,10 +45,10 @@ def told_in_logs(topics: Sequence[TopicRows]) -> list[TopicRows]:
     found = []
     for topic in plain or logs:
         lines = zip(topic.columns["name"], topic.columns["message"], strict=True)
-        telling = {i: row for i, line in enumerate(lines) if (row := told(*line)) is not None}
-        if telling:
-            rows = topic.take(np.array(list(telling), dtype=np.int64))
-            name, status = np.array(list(telling.values()), dtype=object).T
+        told = {i: row for i, line in enumerate(lines) if (row := told_of(*line)) is not None}
+        if told:
+            rows = topic.take(np.array(list(told), dtype=np.int64))
+            name, status = np.array(list(told.values()), dtype=object).T
             columns = recovery_columns(name, status, "", "log", len(rows))
             found.append(replace(rows, table="recoveries", columns=columns, messages=len(rows)))
     return found
@@ -59,7 +59,7 @@ def is_told_in_log(topic: TopicRows) -> bool:
     return topic.table == "recoveries" and topic.type in _LOGS
 
 
-def told(node: str, line: str) -> tuple[str, str] | None:
+def told_of(node: str, line: str) -> tuple[str, str] | None:
     """Name and status of the recovery or the navigation a line tells of, None for other lines."""
     line = line.strip()
     for pattern, status in _BEHAVIOURS:
