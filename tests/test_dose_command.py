@@ -58,7 +58,7 @@ def test_a_design_is_answered_with_a_table_and_a_folder(bundle, recipe, tmp_path
     assert ran.exit_code == 0, ran.exception
     lines = ran.stdout.splitlines()
     assert lines[0] == "How many scans can go missing?"
-    (head,) = [k for k, line in enumerate(lines) if line.startswith("perturbation ")]
+    (head,) = [k for k, line in enumerate(lines) if line.split()[:1] == ["perturbation"]]
     assert [line.split()[:3] for line in lines[head + 1 : head + 3]] == [
         ["scan_drop.random", "ratio", "amcl"],
         ["initial_pose.offset", "m", "amcl"],

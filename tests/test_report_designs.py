@@ -14,7 +14,7 @@ from slamreplay.report.build import build
 from slamreplay.report.designs import design_notes, design_of, design_table, ranking_table
 from slamreplay.report.html import html
 from slamreplay.report.phrases import trials_note
-from slamreplay.report.trace_text import trace_lines
+from slamreplay.report.trace_text import jump_lines
 from slamreplay.report.trial_curves import curves_of_trials
 from slamreplay.testing.synthetic import START_NS, synthetic_bundle
 
@@ -137,4 +137,4 @@ def test_a_perturbation_that_is_not_installed_here_is_left_to_the_table_of_trial
 def test_jumps_of_runs_that_are_made_to_break_are_no_news_for_the_terminal(bare):
     jumps = replace(bare, jumps=((Trial("b", "amcl", 0, "tf_delay.odometry", 1.0, "s"), (None,)),))
 
-    assert list(trace_lines(jumps)) == []
+    assert list(jump_lines(jumps)) == []

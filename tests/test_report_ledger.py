@@ -2,6 +2,7 @@
 
 import json
 import re
+from pathlib import Path
 
 import jsonschema
 import numpy as np
@@ -16,6 +17,7 @@ from slamreplay.bundle.store import write_bundle
 from slamreplay.bundle.track import PoseTrack
 from slamreplay.bundle.view import Bundle
 from slamreplay.cli import report
+from slamreplay.cli.summary import show_summary
 from slamreplay.errors import UsageError
 from slamreplay.evidence.ledger import ledger_bytes, ledger_sets
 from slamreplay.evidence.trace import trace
@@ -27,7 +29,7 @@ from slamreplay.replay.runner import replay
 from slamreplay.report.build import build
 from slamreplay.report.html import html
 from slamreplay.report.model import schema_text
-from slamreplay.report.trace_text import trace_lines
+from slamreplay.report.trace_text import jump_lines
 from slamreplay.report.writer import write_report
 from slamreplay.testing import edits, synthetic_bundle
 from slamreplay.testing.synthetic import true_path
@@ -126,8 +128,9 @@ def test_the_same_ledger_gives_the_same_bytes(bundle):
     )
 
 
-def test_the_page_and_the_terminal_say_it_too(post):
-    page, lines = html(post), "\n".join(trace_lines(post))
+def test_the_page_and_the_terminal_say_it_too(post, capsys):
+    show_summary(post, Path("report.html"))
+    page, lines = html(post), capsys.readouterr().out
 
     assert "Which measurement moved the belief" in page
     for text in (page.replace("&gt;", ">"), lines):
@@ -146,7 +149,7 @@ def test_without_a_moment_and_without_a_localizer_nothing_is_made_up(bundle):
     assert content["trace"] is None
     assert content["jumps"] == []
     assert content["ledger"] == {"file": None, "rows": 0, "sources": []}
-    assert not list(trace_lines(post))
+    assert not list(jump_lines(post))
     assert "Which measurement moved the belief" not in html(post)
 
 

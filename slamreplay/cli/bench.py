@@ -9,6 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from slamreplay.cli.options import Json, Seed
+from slamreplay.cli.terminal import complain, say_json
 from slamreplay.errors import UsageError
 
 Output = Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="Folder to write.")]
@@ -147,13 +148,11 @@ def _check(given: list[str] | None, known: Iterable[str]) -> None:
 def _tell(figures: dict[str, Any], text: str | None, page: Path, lines: list[str]) -> None:
     """The figures as JSON or as text; then the goals that were missed, which make the exit code."""
     if text is None:
-        import json
-
-        typer.echo(json.dumps(figures, indent=1, allow_nan=False, sort_keys=True))
+        say_json(figures, allow_nan=False, sort_keys=True)
     else:
         typer.echo(text)
-        typer.echo(str(page), err=True)
+        complain(str(page))
     for line in lines:
-        typer.echo(line, err=True)
+        complain(line)
     if lines:
         raise typer.Exit(1)

@@ -7,10 +7,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import typer
-
-from slamreplay.cli.columns import in_columns
 from slamreplay.cli.options import checked_seed
+from slamreplay.cli.terminal import complain, say, say_json, say_table
 
 if TYPE_CHECKING:
     from slamreplay.doses.plan import Plan
@@ -66,7 +64,7 @@ def run_design(
     if parameters:
         given = read_parameters(parameters, list(plan.estimators), robot)
     for line in given.told:
-        typer.echo(line, err=True)
+        complain(line)
     with (
         watched(watch_folder(), output) as watch,
         log_or_scenario(logs, recipe.scenario, how, path) as bundle,
@@ -81,10 +79,10 @@ def run_design(
         keep = own is None or own != logs[0].resolve()
         write_answer(output, bundle, plan, found, log, keep_bundle=keep, cache=cache_folder())
     if as_json:
-        typer.echo(results_json(plan, found.results, log), nl=False)
+        say_json(results_json(plan, found.results, log))
         return
-    typer.echo(_told(found.results, log, found.trials))
-    typer.echo(f"\nruns and results written to {output}", err=True)
+    _show(found.results, log, found.trials)
+    complain(f"runs and results written to {output}")
 
 
 def _overridden(plan: Plan, estimators: Sequence[str], seed: int | None) -> Plan:
@@ -99,18 +97,27 @@ def _overridden(plan: Plan, estimators: Sequence[str], seed: int | None) -> Plan
     return plan
 
 
-def _told(results: DoseResults, log: Mapping[str, Any], trials: int) -> str:
-    """Question, table, what broke first, and every failed control."""
+def _show(results: DoseResults, log: Mapping[str, Any], trials: int) -> None:
+    """Question, every failed control, table, and what broke first."""
     from slamreplay.report.dose_tables import critical_rows, notes, ranking_rows, warning
 
     failed = [warning(c) for c in results.controls if c.passed is False]
     scenario = log["scenario"]
     of = f"scenario {scenario['name']}, seed {scenario['seed']}; " if scenario else ""
-    lines = [results.question, "", *failed, *([""] if failed else [])]
-    lines += [f"critical level: {results.limits[0].title}", in_columns(critical_rows(results)), ""]
-    lines += ["what breaks first:", in_columns(ranking_rows(results)), ""]
+    say((results.question, "head"))
+    for line in failed:
+        say()
+        say((line, "bad"))
+    say()
+    say(f"critical level: {results.limits[0].title}")
+    say_table(critical_rows(results), indent=2)
+    say()
+    say("what breaks first:")
+    say_table(ranking_rows(results), indent=2)
     first, *others = results.seeds
     seeds = f"seeds {first} to {others[-1]}" if others else f"seed {first}"
-    lines += [f"({of}{trials} trials, {seeds})"]
-    lines += [f"note: {note}" for note in notes(results) if note not in failed]
-    return "\n".join(lines)
+    say()
+    say(f"({of}{trials} trials, {seeds})")
+    for note in notes(results):
+        if note not in failed:
+            say(f"note: {note}", indent=6)

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import asdict
 from difflib import get_close_matches
-from textwrap import fill
 from typing import Annotated
 
 import typer
 
 from slamreplay.bundle.findings import FINDINGS
 from slamreplay.cli.options import Json
+from slamreplay.cli.terminal import say, say_json, say_labelled
 from slamreplay.errors import UsageError
 
 
@@ -34,16 +33,12 @@ def _explain(
     name = known[id_.lower()]
     explanation = FINDINGS[name]
     if as_json:
-        typer.echo(json.dumps({"id": name, **asdict(explanation)}, indent=1))
+        say_json({"id": name, **asdict(explanation)})
         return
-    typer.echo(f"{name}  {explanation.title}")
+    say((f"{name}  {explanation.title}", "head"), indent=len(name) + 2)
     for head, text in (
         ("it asks", explanation.asks),
         ("how", explanation.method),
         ("it misleads", explanation.misleads),
     ):
-        indent = " " * 14
-        first = f"  {head:<12}"
-        typer.echo(
-            fill(text, 100, initial_indent=first, subsequent_indent=indent, break_on_hyphens=False)
-        )
+        say_labelled(head, text, column=13)

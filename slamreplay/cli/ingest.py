@@ -31,6 +31,7 @@ def ingest(
     """Read a log into a bundle: immutable, columnar, hashed."""
     from slamreplay.cli.inspect import show
     from slamreplay.cli.progress import progress_bar
+    from slamreplay.cli.terminal import complain
     from slamreplay.consistency.audits.inspection import inspect, summary
     from slamreplay.ingest.pipeline import ingest as run
 
@@ -40,4 +41,4 @@ def ingest(
     with progress_bar("reading") as progress:
         bundle = run(logs, output, given, progress=progress)
     show(inspect(bundle) if json else summary(bundle), as_json=json, brief=True)
-    typer.echo(f"wrote {output}", err=True)
+    complain(f"wrote {output}")

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import json as jsonlib
-import sys
-from typing import TYPE_CHECKING, Any
+from collections.abc import Collection, Sequence
+from typing import Any
 
 import typer
 
 from slamreplay.cli import options as o
-
-if TYPE_CHECKING:
-    from rich.table import Table
+from slamreplay.cli.columns import Cell, Tone
+from slamreplay.cli.terminal import say, say_json, say_table
 
 
 def register(app: typer.Typer) -> None:
@@ -54,100 +52,86 @@ def inspect(
 def show(answers: dict[str, Any], *, as_json: bool, brief: bool = False) -> None:
     """Print the answers on stdout; `brief` leaves the audit out."""
     if as_json:
-        typer.echo(jsonlib.dumps(answers, indent=1, allow_nan=False))
+        say_json(answers, allow_nan=False)
         return
-    from rich.console import Console
-
-    # A pipe has no width of its own; lines for a file need not be folded to 80 columns.
-    console = Console(width=None if sys.stdout.isatty() else 160, highlight=False)
     whole = answers["bundle"]
     names = ", ".join(s["name"] for s in whole["sources"])
-    console.print(f"bundle {whole['id']}: {names}, {whole['duration_s']:.1f} s", markup=False)
-    console.print(_roles(answers))
-    console.print(_missing(answers))
+    say((f"bundle {whole['id']}", "head"), f": {names}, {whole['duration_s']:.1f} s", indent=2)
+    _section("What is there", _roles(answers), numbers=(2, 3))
+    if answers["missing"]:
+        title = f"Missing of the eight parts: {len(answers['missing'])}"
+        _section(title, _missing(answers))
+    else:
+        _nothing("Nothing is missing: all eight parts are there.")
     if answers["maps"]:
-        console.print(_maps(answers))
+        _section("Maps, the last one holds at the end", _maps(answers))
     if not brief:
-        clock = answers["clock"]
-        console.print(f"clock: {clock['name']}, {clock['reason']}", markup=False)
-        console.print(_clock(answers))
-        _print_frames(console, answers["frames"])
-        console.print(_findings(answers))
+        _show_clock(answers)
+        _show_frames(answers["frames"])
+        if answers["findings"]:
+            _section("Clocks, tf and numbers", _findings(answers))
+        else:
+            _nothing("Clocks, tf and numbers: nothing to remark.")
     if answers["losses"]:
-        console.print(_losses(answers))
+        _section("Skipped, lost, repaired", _losses(answers), numbers=(2,))
 
 
-#: Columns of numbers.
-_RIGHT = frozenset({"messages", "Hz", "count", "rows", "median s", "p95 s", "drift ppm", "gaps"})
+def _section(
+    title: str,
+    rows: list[list[Cell]],
+    *,
+    numbers: Collection[int] = (),
+    ends: Sequence[str] = (),
+) -> None:
+    say()
+    say((title, "head"), indent=2)
+    say_table(rows, numbers=numbers, ends=ends, indent=2)
 
 
-def _grid(title: str, *columns: str) -> Table:
-    from rich import box
-    from rich.table import Table
-
-    table = Table(title=title, title_justify="left", box=box.SIMPLE_HEAD)
-    for column in columns:
-        right = column in _RIGHT
-        name = column in ("role", "topic", "table", "what", "id")
-        table.add_column(
-            column, justify="right" if right else "left", overflow="fold", no_wrap=name
-        )
-    return table
+def _nothing(text: str) -> None:
+    say()
+    say((text, "good"), indent=2)
 
 
 def _number(value: float | None, digits: int = 3) -> str:
     return "-" if value is None else f"{value:.{digits}f}"
 
 
-def _text(value: object) -> str:
-    from rich.markup import escape
-
-    return escape(str(value))
-
-
-def _roles(answers: dict[str, Any]) -> Table:
-    table = _grid("What is there", "role", "topic", "messages", "Hz", "why")
+def _roles(answers: dict[str, Any]) -> list[list[Cell]]:
+    rows: list[list[Cell]] = [["role", "topic", "messages", "Hz", "why"]]
     for role in answers["roles"]:
-        table.add_row(
-            role["role"],
-            _text(role["topic"]),
-            str(role["messages"]),
-            _number(role["rate_hz"], 1),
-            _text(role["reason"]),
-        )
-    return table
+        rate = _number(role["rate_hz"], 1)
+        rows.append([role["role"], role["topic"], str(role["messages"]), rate, role["reason"]])
+    return rows
 
 
-def _missing(answers: dict[str, Any]) -> Table | str:
-    if not answers["missing"]:
-        return "Nothing is missing: all eight parts are there."
-    title = f"Missing of the eight parts: {len(answers['missing'])}"
-    table = _grid(title, "part", "because", "so that")
-    for part in answers["missing"]:
-        table.add_row(part["part"], _text(part["reason"]), _text(part["consequence"]))
-    return table
+def _missing(answers: dict[str, Any]) -> list[list[Cell]]:
+    rows: list[list[Cell]] = [["part", "because", "so that"]]
+    rows += ([(m["part"], "doubt"), m["reason"], m["consequence"]] for m in answers["missing"])
+    return rows
 
 
-def _maps(answers: dict[str, Any]) -> Table:
-    title = "Maps, the last one holds at the end"
-    table = _grid(title, "version", "from", "cells", "m per cell", "held, s")
+def _maps(answers: dict[str, Any]) -> list[list[Cell]]:
+    rows: list[list[Cell]] = [["version", "from", "cells", "m per cell", "held, s"]]
     start_ns = answers["bundle"]["start_ns"]
     for entry in answers["maps"]:
         size = f"{entry['width']} x {entry['height']}"
-        resolution = f"{entry['resolution_m']:g}"
         spans = [tuple((t - start_ns) / 1e9 for t in span) for span in entry["held_ns"]]
         held = ", ".join(f"{first:.1f} to {last:.1f}" for first, last in spans)
-        table.add_row(entry["folder"], _text(entry["source"]), size, resolution, held)
-    return table
+        rows.append([entry["folder"], entry["source"], size, f"{entry['resolution_m']:g}", held])
+    return rows
 
 
-def _clock(answers: dict[str, Any]) -> Table:
-    title = "Log time minus header stamp"
-    table = _grid(title, "topic", "table", "rows", "Hz", "median s", "p95 s", "drift ppm", "gaps",
-                  "placed by")  # fmt: skip
-    for topic in answers["clock"]["topics"]:
-        table.add_row(
-            _text(topic["topic"]),
+def _show_clock(answers: dict[str, Any]) -> None:
+    clock = answers["clock"]
+    say()
+    say((f"clock: {clock['name']}", "head"), f", {clock['reason']}", indent=2)
+    rows: list[list[Cell]] = [
+        ["topic", "table", "rows", "Hz", "median s", "p95 s", "drift ppm", "gaps"]
+    ]
+    rows += (
+        [
+            topic["topic"],
             topic["table"],
             str(topic["rows"]),
             _number(topic["rate_hz"], 1),
@@ -155,41 +139,44 @@ def _clock(answers: dict[str, Any]) -> Table:
             _number(topic["log_minus_stamp_p95_s"]),
             _number(topic["drift_ppm"], 0),
             "-" if topic["gap_count"] is None else str(topic["gap_count"]),
-            topic["by"],
-        )
-    return table
+        ]
+        for topic in clock["topics"]
+    )
+    by = [t["by"] for t in clock["topics"]]
+    ends = ["", *("" if how == "header stamp" else f"placed by {how}" for how in by)]
+    _section("Log time minus header stamp", rows, numbers=range(2, 8), ends=ends)
 
 
-def _findings(answers: dict[str, Any]) -> Table | str:
-    if not answers["findings"]:
-        return "Clocks, tf and numbers: nothing to remark."
-    table = _grid("Clocks, tf and numbers", "id", "severity", "what was found")
+_SEVERITY: dict[str, Tone] = {"error": "bad", "warning": "doubt", "info": "quiet"}
+
+
+def _findings(answers: dict[str, Any]) -> list[list[Cell]]:
+    rows: list[list[Cell]] = [["id", "severity", "what was found"]]
     for finding in answers["findings"]:
-        table.add_row(finding["id"], finding["severity"], _text(finding["message"]))
-    return table
+        severity = finding["severity"]
+        rows.append([finding["id"], (severity, _SEVERITY[severity]), finding["message"]])
+    return rows
 
 
-def _print_frames(console: Any, frames: dict[str, Any]) -> None:
-    from rich.tree import Tree
-
+def _show_frames(frames: dict[str, Any]) -> None:
     named = ", ".join(f"{name} {frames[name] or '-'}" for name in ("map", "odom", "base"))
-    console.print(f"frames: {named}", markup=False)
+    say()
+    say(("frames", "head"), f": {named}", indent=2)
     below: dict[str, list[dict[str, Any]]] = {}
     for edge in frames["tree"]:
         below.setdefault(edge["parent"], []).append(edge)
     children = {edge["child"] for edge in frames["tree"]}
 
-    def grow(node: Tree, frame: str) -> None:
+    def grow(frame: str, about: str, depth: int) -> None:
+        say("  " * depth, f"{frame}{about}", indent=2 * depth + 4)
         for edge in below.get(frame, []):
-            grow(node.add(f"{_text(edge['child'])} ({_edge(edge)})"), edge["child"])
+            grow(edge["child"], f" ({_edge(edge)})", depth + 1)
 
     for root in sorted(set(below) - children):
-        tree = Tree(_text(root))
-        grow(tree, root)
-        console.print(tree)
+        grow(root, "", 1)
     if frames["without_tf"]:
         names = ", ".join(frames["without_tf"])
-        console.print(f"sensor frames without tf, taken to be the base: {names}", markup=False)
+        say(f"sensor frames without tf, taken to be the base: {names}", indent=2)
 
 
 def _edge(edge: dict[str, Any]) -> str:
@@ -205,8 +192,7 @@ def _edge(edge: dict[str, Any]) -> str:
     return ", ".join(words)
 
 
-def _losses(answers: dict[str, Any]) -> Table:
-    table = _grid("Skipped, lost, repaired", "kind", "what", "count", "why")
-    for loss in answers["losses"]:
-        table.add_row(loss["kind"], _text(loss["what"]), str(loss["count"]), _text(loss["reason"]))
-    return table
+def _losses(answers: dict[str, Any]) -> list[list[Cell]]:
+    rows: list[list[Cell]] = [["kind", "what", "count", "why"]]
+    rows += ([x["kind"], x["what"], str(x["count"]), x["reason"]] for x in answers["losses"])
+    return rows

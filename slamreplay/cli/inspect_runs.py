@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import typer
-
-from slamreplay.cli.columns import in_columns
+from slamreplay.cli.terminal import say, say_json, say_table
 
 if TYPE_CHECKING:
     from slamreplay.bundle.run import Run
@@ -104,7 +101,7 @@ def _answers(
 def show_runs(answers: dict[str, Any], *, as_json: bool) -> None:
     """Print the answers on stdout."""
     if as_json:
-        typer.echo(json.dumps(answers, indent=1, allow_nan=False))
+        say_json(answers, allow_nan=False)
         return
     rows = answers["trials"]
     count = {s: sum(row["state"] == s for row in rows) for s in ("done", "running", "waiting")}
@@ -115,7 +112,8 @@ def show_runs(answers: dict[str, Any], *, as_json: bool) -> None:
         told += "time left not known yet" if left is None else f"about {_duration(left)} left"
     elif answers["state"] == "interrupted":
         told += " and kept; the same command goes on from there"
-    typer.echo(f"{answers['runs']}: {answers['state']}, {told}\n")
+    say(f"{answers['runs']}: {answers['state']}, {told}")
+    say()
     columns = [c for c in _COLUMNS if any((row["metrics"] or {}).get(c[1]) for row in rows)]
     with_state = answers["state"] != "finished"
     head = ["estimator", "perturbation", "level", "seed", *["state"] * with_state]
@@ -123,7 +121,7 @@ def show_runs(answers: dict[str, Any], *, as_json: bool) -> None:
     lines += [_line(row, columns, with_state=with_state) for row in rows]
     reasons = [row["not_applicable"] for row in rows]
     ends = ["", *(f"not applicable: {reason}" if reason else "" for reason in reasons)]
-    typer.echo(in_columns(lines, words=len(head), ends=ends))
+    say_table(lines, numbers=range(len(head), len(lines[0])), ends=ends)
 
 
 def _line(

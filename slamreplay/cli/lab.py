@@ -6,10 +6,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import typer
-
-from slamreplay.cli.columns import in_columns
 from slamreplay.cli.options import checked_seed
+from slamreplay.cli.terminal import complain, say, say_json, say_table
 from slamreplay.errors import UsageError
 
 if TYPE_CHECKING:
@@ -67,15 +65,16 @@ def show(head: dict[str, Any], results: LabResults, output: Path, *, as_json: bo
     from slamreplay.labs.folder import results_json
 
     if as_json:
-        typer.echo(results_json(head, results), nl=False)
+        say_json(results_json(head, results))
         return
-    typer.echo(head["question"])
+    say((str(head["question"]), "head"))
     for table in results.tables:
-        typer.echo(f"\n{table.title}\n{_text(table)}")
-    typer.echo(f"\nresults written to {output}", err=True)
+        say()
+        say(table.title)
+        say_table(_rows(table), indent=2)
+    complain(f"results written to {output}")
 
 
-def _text(table: ResultTable) -> str:
+def _rows(table: ResultTable) -> list[list[str]]:
     columns = [k for k, name in enumerate(table.head) if name in (table.brief or table.head)]
-    lines = [[row[k] for k in columns] for row in (table.head, *table.rows)]
-    return in_columns(lines)
+    return [[row[k] for k in columns] for row in (table.head, *table.rows)]

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import json
+from itertools import groupby
 from math import isfinite
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from slamreplay.cli.options import Json
+from slamreplay.cli.terminal import say, say_json, say_table
 from slamreplay.errors import UsageError
 
 if TYPE_CHECKING:
@@ -30,16 +31,14 @@ def _list(
         raise UsageError(f"there is no list of '{kind}'", hint=f"there are: {', '.join(KINDS)}")
     rows = _rows(kind)
     if as_json:
-        typer.echo(json.dumps(rows, indent=1))
+        say_json(rows)
         return
     if kind == "perturbations":
-        typer.echo(_grouped(rows))
+        _show_grouped(rows)
         return
-    columns = [key for key in rows[0] if key != "doc"] if rows else []
-    widths = {key: max(len(str(row[key])) for row in rows) for key in columns}
-    for row in rows:
-        cells = [f"{row[key]!s:<{widths[key]}}" for key in columns]
-        typer.echo("  ".join([*cells, str(row["doc"])]).rstrip())
+    columns = list(rows[0]) if rows else []
+    heads = ["" if key == "doc" else key for key in columns]
+    say_table([heads, *([str(row[key]) for key in columns] for row in rows)], with_head=False)
 
 
 def _rows(kind: str) -> list[dict[str, object]]:
@@ -92,26 +91,35 @@ def _perturbations() -> list[dict[str, object]]:
     return rows
 
 
-def _grouped(rows: list[dict[str, object]]) -> str:
-    """Each perturbation with what it touches, and below it what its levels mean."""
+def _show_grouped(rows: list[dict[str, object]]) -> None:
+    """Print each perturbation with what it touches, and below it what its levels mean."""
+    say("NAME.VARIANT=LEVEL; of the level: unit, what changes nothing, least to greatest")
+    groups = [(name, list(group)) for name, group in groupby(rows, _perturbation_of)]
+    # One width for all groups, so that their columns stand below each other.
+    wide, long = (max(len(text) for text in texts) for texts in zip(
+        *((str(row["name"]), _level(row)) for row in rows), strict=True))  # fmt: skip
+    for name, group in groups:
+        say()
+        say((f"{name}:", "head"), f" {group[0]['about']}", indent=2)
+        say("  ", (f"changes {_touched(group[0])}", "quiet"), indent=4)
+        rows_of = [[f"{row['name']!s:<{wide}}", f"{_level(row):<{long}}", str(row["doc"])]
+                   for row in group]  # fmt: skip
+        say_table([["", "", ""], *rows_of], indent=2, with_head=False)
+
+
+def _perturbation_of(row: dict[str, object]) -> str:
+    return str(row["name"]).partition(".")[0]
+
+
+def _touched(row: dict[str, object]) -> str:
+    """Tables, and the estimators' settings."""
     from slamreplay.bundle.schema import TABLES
 
-    lines = ["NAME.VARIANT=LEVEL; of the level: unit, what changes nothing, least to greatest"]
-    cells = [[str(row["name"]), _level(row), str(row["doc"])] for row in rows]
-    widths = [max(len(cell[k]) for cell in cells) for k in (0, 1)]
-    before = ""
-    for row, (name, level, doc) in zip(rows, cells, strict=True):
-        group = name.partition(".")[0]
-        if group != before:
-            touches = row["touches"]
-            assert isinstance(touches, list)
-            settings = [t for t in touches if t not in TABLES and t != "map"]
-            evidence = [t for t in touches if t not in settings]
-            about = f"{', '.join(evidence)}{'settings ' * bool(settings)}{', '.join(settings)}"
-            lines += ["", f"{group}: {row['about']}", f"  changes {about}"]
-        lines.append(f"  {name:<{widths[0]}}  {level:<{widths[1]}}  {doc}")
-        before = group
-    return "\n".join(lines)
+    touches = row["touches"]
+    assert isinstance(touches, list)
+    settings = [t for t in touches if t not in TABLES and t != "map"]
+    evidence = [t for t in touches if t not in settings]
+    return f"{', '.join(evidence)}{'settings ' * bool(settings)}{', '.join(settings)}"
 
 
 def _level(row: dict[str, object]) -> str:

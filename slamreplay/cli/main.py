@@ -15,6 +15,7 @@ import typer
 
 from slamreplay import __version__
 from slamreplay.cli.kernel_cache import keep_kernels
+from slamreplay.cli.terminal import complain, settle_streams
 from slamreplay.errors import SlamreplayError
 
 #: Exit codes of design: 1 is raised by the commands that were asked to judge (`--fail-on`).
@@ -63,6 +64,7 @@ def main() -> None:
 def run() -> int:
     """The exit code of the command in `sys.argv`."""
     debug = "--debug" in sys.argv
+    settle_streams()
     keep_kernels(cache_folder())
     try:
         for name in COMMANDS:
@@ -71,10 +73,10 @@ def run() -> int:
     except _UsageFault as error:
         where = error.ctx.command_path if getattr(error, "ctx", None) else "slamreplay"
         message = " ".join(error.format_message().split()).rstrip(".")
-        typer.echo(f"slamreplay: {message} (hint: see {where} --help)", err=True)
+        complain(f"slamreplay: {message} (hint: see {where} --help)")
         return EXIT_INPUT
     except (typer.Abort, KeyboardInterrupt):
-        typer.echo("stopped", err=True)
+        complain("stopped")
         return EXIT_INTERRUPTED
     except BrokenPipeError:  # the reader of our output went away: `slamreplay inspect B | head`
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -82,15 +84,14 @@ def run() -> int:
     except SlamreplayError as error:
         if debug:
             traceback.print_exc()
-        typer.echo(f"slamreplay: {error}", err=True)
+        complain(f"slamreplay: {error}")
         return EXIT_INPUT
     except Exception as error:  # the last resort: whatever gets here is a fault of ours
         if debug:
             traceback.print_exc()
-        typer.echo(
+        complain(
             f"slamreplay: a fault of ours: {type(error).__name__}: {str(error)[:200]} "
-            f"(written to {_crash_file()}; --debug shows it)",
-            err=True,
+            f"(written to {_crash_file()}; --debug shows it)"
         )
         return EXIT_FAULT
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from slamreplay.cli import options
-from slamreplay.cli.columns import in_columns
+from slamreplay.cli.terminal import complain, say_json, say_table
 from slamreplay.errors import UsageError
 
 if TYPE_CHECKING:
@@ -169,7 +169,7 @@ def perturb(
         ESTIMATORS.target(name)
     given = read_parameters(parameters, chosen, robot) if parameters else Configuration({}, ())
     for line in given.told:
-        typer.echo(line, err=True)
+        complain(line)
     with (
         watched(watch_folder(), output) as watch,
         options.evidence(logs, how, cache=bundle_folder()) as bundle,
@@ -188,10 +188,10 @@ def perturb(
             kept(cache_folder() / "numbers", told, lambda: json.dumps(_rows(bundle, runs)).encode())
         )
     if as_json:
-        typer.echo(json.dumps({"runs": str(output), "trials": rows}, indent=1, allow_nan=False))
+        say_json({"runs": str(output), "trials": rows}, allow_nan=False)
         return
-    typer.echo(_text(rows))
-    typer.echo(f"runs written to {output}", err=True)
+    _show(rows)
+    complain(f"runs written to {output}")
 
 
 def _rows(bundle: Bundle, runs: Sequence[Run]) -> list[dict[str, Any]]:
@@ -217,8 +217,8 @@ def _rows(bundle: Bundle, runs: Sequence[Run]) -> list[dict[str, Any]]:
     ]
 
 
-def _text(rows: list[dict[str, Any]]) -> str:
-    """The trials as a table: every estimator's baseline, and below it what changes from it."""
+def _show(rows: list[dict[str, Any]]) -> None:
+    """Print the trials: every estimator's baseline, and below it what changes from it."""
     order = list(dict.fromkeys(str(row["estimator"]) for row in rows))
     is_compared = any(row["perturbation"] for row in rows)
     columns = list(_FROM_BASELINE) if is_compared else []
@@ -233,7 +233,7 @@ def _text(rows: list[dict[str, Any]]) -> str:
         line += [] if reason else [_number(row["metrics"], key) for _, key in columns]
         lines.append(line)
         reasons.append(f"not applicable: {reason}" if reason else "")
-    return in_columns(lines, words=3, ends=reasons)
+    say_table(lines, numbers=range(3, len(lines[0])), ends=reasons)
 
 
 def _number(metrics: Metrics, key: str) -> str:

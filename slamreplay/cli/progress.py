@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from datetime import timedelta
+
+from slamreplay.cli.terminal import safe
 
 #: From which share done on the time left is told.
 _TOLD_FROM = 0.01
@@ -16,8 +19,8 @@ Progress = Callable[[str, float], None]
 
 @contextmanager
 def progress_bar(title: str) -> Iterator[Progress | None]:
-    """A callback that draws a bar with the time left; None where stderr is no terminal."""
-    if not sys.stderr.isatty():
+    """A callback that draws a bar with the time left; None where stderr is no able terminal."""
+    if not sys.stderr.isatty() or os.environ.get("TERM") == "dumb":
         yield None
         return
     from rich.console import Console
@@ -28,12 +31,12 @@ def progress_bar(title: str) -> Iterator[Progress | None]:
         def render(self, task: Task) -> Text:
             return Text(time_left(task.elapsed or 0.0, task.completed), style="progress.remaining")
 
-    columns = (TextColumn("{task.description}"), BarColumn(), Left())
+    columns = (TextColumn("{task.description}", markup=False), BarColumn(), Left())
     with Progress(*columns, console=Console(stderr=True), transient=True) as bars:
         task = bars.add_task(title, total=1.0)
 
         def show(what: str, share: float) -> None:
-            bars.update(task, description=what, completed=share)
+            bars.update(task, description=safe(what), completed=share)
 
         yield show
 

@@ -21,6 +21,7 @@ from slamreplay.cli.options import (
     evidence,
     ingest_options,
 )
+from slamreplay.cli.terminal import complain, say_json
 from slamreplay.errors import UsageError
 
 if TYPE_CHECKING:
@@ -169,9 +170,11 @@ def _report(
         if figures is not None:
             _draw(post, figures)
     if as_json:
-        typer.echo(build(post).json_text(), nl=False)
+        say_json(build(post).json_text())
     else:
-        _summarise(post, page)
+        from slamreplay.cli.summary import show_summary
+
+        show_summary(post, page)
     if threshold is not None and any(f.severity in _from(threshold) for f in post.findings):
         raise typer.Exit(1)
 
@@ -190,7 +193,7 @@ def _propose(post: Postmortem, target: Path, original: Path | None) -> None:
         raise UsageError("there is no map to correct", hint="give the map with --map")
     changes = None if post.hindsight is None else post.hindsight.changes
     write_proposal(post.grid, changes, target, original)
-    typer.echo(f"corrected map: {target}", err=True)
+    complain(f"corrected map: {target}")
 
 
 @contextmanager
@@ -212,18 +215,6 @@ def _evidence(
         return
     with evidence(logs, options) as bundle:
         yield bundle, [], None
-
-
-def _summarise(post: Postmortem, page: Path) -> None:
-    """The answer in ten lines; the page's path comes last, alone, for scripts and terminals."""
-    from slamreplay.report.summary import summary_lines
-    from slamreplay.report.trace_text import trace_lines
-
-    for line in summary_lines(post):
-        typer.echo(f"{line.label}: {line.text}")
-    for text in trace_lines(post):
-        typer.echo(text)
-    typer.echo(str(page))
 
 
 def _severity(text: str | None) -> Severity | None:

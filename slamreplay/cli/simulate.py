@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from slamreplay.cli.options import Json
+from slamreplay.cli.terminal import say_json, say_path
 from slamreplay.errors import UsageError
 from slamreplay.simulate import SCENARIOS
 
@@ -66,6 +66,6 @@ def _simulate(
             seed = scenario_of(scenario).seed if seed is None else seed
             simulate(scenario, output, seed=seed)
     if as_json:
-        typer.echo(json.dumps({"scenario": scenario, "seed": seed, "log": str(output)}))
+        say_json({"scenario": scenario, "seed": seed, "log": str(output)}, indent=None)
     else:
-        typer.echo(str(output))
+        say_path(output)
