@@ -17,6 +17,8 @@ from slamreplay.bundle.view import BundleView
 from slamreplay.evidence.result import Postmortem
 from slamreplay.evidence.scene import Lane, Scene, SceneClouds, ScenePlans
 from slamreplay.export.tum import trial_name
+from slamreplay.geometry import se2
+from slamreplay.geometry.times import Times
 from slamreplay.maps.grid import OccupancyGrid
 from slamreplay.verdict.judgement import Interval, Stop
 
@@ -67,7 +69,7 @@ class Shown:
         """Whether a moment lies in the window."""
         return self.start_ns <= t_ns <= self.end_ns
 
-    def rows(self, t_ns: np.ndarray, *, in_place: bool = True) -> slice:
+    def rows(self, t_ns: Times, *, in_place: bool = True) -> slice:
         """Rows of ascending times (N,) in the window; of places only since `place_ns`."""
         low = max(self.start_ns, self.place_ns) if in_place else self.start_ns
         first = int(np.searchsorted(t_ns, low))
@@ -146,6 +148,17 @@ def shown(
         scene=post.scene,
         redact=redact,
     )
+
+
+def poses_at(track: PoseTrack, t_ns: Times) -> se2.Array:
+    """(M, 3) poses at other times (M,); NaN where a row of the track beside it has none, too."""
+    after = np.searchsorted(track.t_ns, t_ns)
+    before = np.searchsorted(track.t_ns, t_ns, side="right") - 1
+    inside = (before >= 0) & (after < len(track))
+    known = np.zeros(len(t_ns), dtype=bool)
+    has_pose = track.has_pose
+    known[inside] = has_pose[before[inside]] & has_pose[after[inside]]
+    return np.where(known[:, None], track.at(t_ns).xyyaw, np.nan)
 
 
 def _cut(track: PoseTrack | None, start_ns: int, end_ns: int) -> PoseTrack | None:

@@ -50,6 +50,7 @@ def layout(shown: Shown, schemas: Mapping[str, str]) -> Config:
         "diffMethod": "custom",
         "diffEnabled": False,
         "showFullMessageForDiff": False,
+        "expansion": "all",
         **_titled("Verdict"),
     }
     panels["RosOut!slamreplay"] = {
@@ -203,12 +204,12 @@ def _plot(title: str, lanes: Sequence[tuple[Lane, str]]) -> Config:
             }
         )
         if lane.limit is not None:  # a path that is a number is a level line
-            limit = {"value": f"{lane.limit:g}", "label": f"limit of {lane.title}"}
+            limit = {"value": f"{lane.limit:g}", "label": "limit"}
             paths.append({**common, **limit, "color": colours.GREY})
     return {
         "paths": paths,
         "showLegend": True,
-        "legendDisplay": "floating",
+        "legendDisplay": "top",
         "showPlotValuesInLegend": False,
         "showXAxisLabels": True,
         "showYAxisLabels": True,

@@ -14,7 +14,7 @@ from slamreplay.evidence import colours
 from slamreplay.evidence.scene import SceneClouds, ScenePlans, SceneScans
 from slamreplay.export.foxglove import topics
 from slamreplay.export.foxglove.parts import Stream, fields, line, pose, stamp, update
-from slamreplay.export.shown import Shown
+from slamreplay.export.shown import Shown, poses_at
 
 #: A return: where it ended in the base frame, its colour, and its class (of `Met`).
 _BEAM = np.dtype(
@@ -51,7 +51,7 @@ def _scans(topic: str, scans: SceneScans, track: PoseTrack, shown: Shown) -> Str
     is_drawn = False
     for first in range(rows.start, rows.stop, _ROWS):
         part = slice(first, min(first + _ROWS, rows.stop))
-        poses = track.at(scans.t_ns[part]).xyyaw
+        poses = poses_at(track, scans.t_ns[part])
         for k, t_ns in enumerate(scans.t_ns[part].tolist()):
             is_known = bool(np.isfinite(poses[k]).all())
             if not (is_known or is_drawn):
