@@ -45,6 +45,7 @@ def _of_laser(r: Recording, lidar: Lidar, scans: Scans, mount: np.ndarray) -> np
     to_still, to_added, to_gone = (_cast(r, solids, rays) for solids in (still, added, gone))
     to_person = ranges_to(r.scenario.walkers, t_s, rays)
     hit = np.isfinite(ranges) & (ranges > 0.0)
+    to_still, to_added, to_person = (np.minimum(to, 1e3) for to in (to_still, to_added, to_person))
     first = np.minimum(np.minimum(to_still, to_added), to_person)
     met = np.full(len(ranges), UNASKED)
     for to, code in (
@@ -52,9 +53,7 @@ def _of_laser(r: Recording, lidar: Lidar, scans: Scans, mount: np.ndarray) -> np
         (to_added, Met.APPEARED),
         (to_person, Met.MOVING),
     ):
-        is_it = hit & (to == first)
-        assert np.abs(ranges[is_it] - to[is_it]).max(initial=0.0) < _NOISE_M
-        met[is_it] = code
+        met[hit & (to == first) & (np.abs(np.where(hit, ranges, 0.0) - to) < _NOISE_M)] = code
     about_a_wall = _to_mapped(r, rays, ranges) < _NEAR_M
     met[about_a_wall & (met != Met.MAPPED)] = UNASKED
     met[hit & (to_gone < ranges - _THROUGH_M)] = Met.REMOVED
