@@ -21,8 +21,8 @@ from slamreplay.report.replay.tracks import HEADING_RAD, PLACE_M, Ticks
 
 #: Around what is shown, m; a map up to this many times larger than the paths is shown whole.
 _MARGIN_M, _WHOLE_UP_TO = 1.5, 1.7
-#: A map this much wider than tall needs less height.
-_WIDE = 2.6
+#: A map this much wider than tall needs less height, one this much taller than wide more.
+_WIDE, _TALL = 2.6, 1.2
 
 
 def head_of(
@@ -67,11 +67,13 @@ def head_of(
 
 
 def shape_of(head: Mapping[str, Any]) -> str:
-    """How tall the map shall be: none without one, wide where it is a corridor, else plain."""
+    """How tall the map shall be: none without one, wide or tall where the place is, else plain."""
     if head["window"] is None:
         return "none"
     x0, y0, x1, y1 = head["window"]
-    return "wide" if x1 - x0 > _WIDE * (y1 - y0) else "plain"
+    if x1 - x0 > _WIDE * (y1 - y0):
+        return "wide"
+    return "tall" if y1 - y0 > _TALL * (x1 - x0) else "plain"
 
 
 def _seconds(post: Postmortem, t_ns: int) -> float:
@@ -114,11 +116,14 @@ def _stops(post: Postmortem) -> Iterator[dict[str, object]]:
 
 
 def _mark(post: Postmortem, mark: Mark) -> dict[str, object]:
-    end = None if mark.end_ns is None else _seconds(post, mark.end_ns)
+    """A mark on the timeline: what began before the log's start stands at its edge."""
+    first, last = post.manifest.start_ns, post.manifest.end_ns
+    t_ns = min(max(mark.t_ns, first), last)
+    end_ns = None if mark.end_ns is None else min(max(mark.end_ns, t_ns), last)
     return {
         "kind": mark.kind,
-        "t": _seconds(post, mark.t_ns),
-        "end": end,
+        "t": _seconds(post, t_ns),
+        "end": None if end_ns is None else _seconds(post, end_ns),
         "title": mark.title,
         "severity": mark.severity,
     }

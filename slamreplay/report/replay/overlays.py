@@ -60,7 +60,7 @@ def _packed(
     of_one, of_all = (_OF_CLOUD, _OF_CLOUDS) if name == "clouds" else (_OF_PLAN, _OF_PLANS)
     lengths = np.minimum(np.diff(first), of_one)
     groups = np.arange(len(t_ns))[:: max(1, -(-int(lengths.sum()) // of_all))]
-    sound = np.isfinite(points).all(axis=1)
+    sound = np.asarray(np.isfinite(points).all(axis=1))
     rows = [_evenly(int(first[g]), int(first[g + 1]), of_one) for g in groups]
     rows = [r[sound[r]] for r in rows]
     kept = points[np.concatenate(rows)].astype(np.float64)

@@ -38,7 +38,7 @@ class Replay:
         payload: base64 of what `packing` describes.
         notes: what is shown and what was left out, in sentences.
         rows: so many rows of the timeline, and so many lanes: the page keeps room for them.
-        shape: how tall the map is: wide, plain or none.
+        shape: of the map: wide, tall, plain or none.
     """
 
     payload: str

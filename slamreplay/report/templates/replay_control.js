@@ -204,7 +204,9 @@ function readLayers() {
 function offerLayers() {
   const { scene } = player;
   const { tracks, head } = scene;
-  const met = (kinds) => scene.scans.some((scans) => scans.met.some((one) => kinds.includes(one)));
+  const seen = new Set();
+  for (const scans of scene.scans) for (const one of scans.met) seen.add(one);
+  const met = (kinds) => kinds.some((kind) => seen.has(kind));
   const has = {
     belief: tracks.belief, hindsight: tracks.hindsight, odometry: tracks.odometry,
     "scan-belief": tracks.belief && scene.scans.length,
@@ -336,6 +338,7 @@ function forPaper(on) {
 }
 
 player.lanes.style.height = `${lanesHeight(section, player.lanes.clientWidth)}px`;
+if (section.clientWidth < NARROW) find("shown").open = false; // a phone has no room for all of it
 addEventListener("hashchange", () => follow(location.hash));
 // The same link twice changes no address, and still asks for its moment.
 document.addEventListener("click", (event) => {
