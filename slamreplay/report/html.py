@@ -1,4 +1,4 @@
-"""report.html: one file, no network, nothing in it that runs."""
+"""report.html: one file, no network; nothing in it runs but the replay."""
 
 from __future__ import annotations
 
@@ -17,11 +17,22 @@ from slamreplay.report.figures import canvas
 from slamreplay.report.figures.panels import PANELS
 from slamreplay.report.page import Page, page
 from slamreplay.report.phrases import bound
+from slamreplay.report.replay.replay import replay_of
 from slamreplay.report.sections import sections
 
 #: Files of the templates' folder that go into the page as they are.
-_STYLES = ("report.css",)
-_SCRIPTS: tuple[str, ...] = ()
+_STYLES = ("report.css", "replay.css")
+#: One idea each; together they are one module, in this order.
+_SCRIPTS = (
+    "replay_data.js",
+    "replay_words.js",
+    "replay_ink.js",
+    "replay_view.js",
+    "replay_map.js",
+    "replay_lanes.js",
+    "replay_pointer.js",
+    "replay_control.js",
+)
 
 
 @dataclass(frozen=True)
@@ -36,7 +47,9 @@ class Picture:
 def html(post: Postmortem) -> str:
     """The whole page. Whatever came from the log is escaped by the template engine."""
     view = page(post)
-    styles, scripts = _texts(_STYLES), _texts(_SCRIPTS)
+    replay = replay_of(post)
+    styles = _texts(_STYLES)
+    scripts = [] if replay is None else ["\n".join(_texts(_SCRIPTS))]
     environment = Environment(
         loader=PackageLoader("slamreplay.report", "templates"),
         autoescape=True,
@@ -48,6 +61,7 @@ def html(post: Postmortem) -> str:
     pictures = _pictures(post, view)
     text = environment.get_template("report.html.j2").render(
         page=view,
+        replay=replay,
         sections=sections(view, pictures),
         policy=_policy(styles, scripts),
         styles=styles,
