@@ -12,6 +12,7 @@ from slamreplay.bundle.run import Run, Trial
 from slamreplay.bundle.view import Bundle, BundleView
 from slamreplay.consistency.answers import raised
 from slamreplay.consistency.asking import answered
+from slamreplay.consistency.audits.inspection import clock_and_frames
 from slamreplay.consistency.belief.credibility import nees_of_belief
 from slamreplay.consistency.belief.jumps.found import jumps_of
 from slamreplay.consistency.belief.jumps.log_events import with_subjects
@@ -156,6 +157,7 @@ def postmortem(
         root_cause=began,
         latency=late,
         usages=used,
+        audit=clock_and_frames(context.audit),
     )
     if scene:
         say("scene", 0.98)

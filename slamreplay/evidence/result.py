@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -69,6 +70,8 @@ class Postmortem:
         latency: how old the pose was whenever it was used, None where that was not asked.
         usages: the same in a few numbers, by consumer.
         scene: what there was to see at each moment; None where nobody asked.
+        audit: how clocks and tf of the log hold together, as `slamreplay inspect --json` has it;
+            None where nobody looked.
         slam: the map and the graph that the undisturbed run of `pose_graph` made.
         reliability: how often what was said with a confidence was right, as measured.
     """
@@ -95,6 +98,7 @@ class Postmortem:
     latency: Latency | None = None
     usages: tuple[Usage, ...] = ()
     scene: Scene | None = None
+    audit: Mapping[str, Any] | None = None
     slam: MapAndGraph | None = None
     reliability: Reliability = field(default_factory=measured_reliability)
 

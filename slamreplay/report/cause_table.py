@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from slamreplay.evidence.result import Postmortem
 from slamreplay.evidence.words import FAILURE_MODES
+from slamreplay.report.cells import Cell, Table, table
+from slamreplay.report.moments import moment_cell
 from slamreplay.report.phrases import percent, seconds
-from slamreplay.report.tables import Cell, Table, table
 from slamreplay.rootcause.result import Candidate
 
 _HEAD = ("began as", "what was put back", "how much", "from", "what it did", "probability")
@@ -16,13 +17,12 @@ def causes(post: Postmortem) -> Table:
     cause = post.root_cause
     if cause is None or not cause.trials:
         return table(_HEAD, [])
-    start_ns = post.manifest.start_ns
-    return table(_HEAD, [_row(one, start_ns) for one in cause.candidates])
+    return table(_HEAD, [_row(one, post) for one in cause.candidates])
 
 
-def _row(one: Candidate, start_ns: int) -> tuple[str | Cell, ...]:
+def _row(one: Candidate, post: Postmortem) -> tuple[str | Cell, ...]:
     much = "" if one.level is None else f"{one.level:.3g} {one.unit}".replace(" ratio", "")
-    since = "all along" if one.start_ns is None else seconds(one.start_ns - start_ns)
+    since = Cell("all along") if one.start_ns is None else moment_cell(post, one.start_ns)
     name = "no single thing" if one.kind == "none" else FAILURE_MODES[one.kind]
     return name, one.perturbation or "", much, since, one.text, percent(one.probability)
 

@@ -6,9 +6,9 @@ from collections.abc import Iterator
 
 from slamreplay.consistency.belief.summary import ConsistencySummary, PartSummary
 from slamreplay.consistency.statistics.distribution import LEVELS
+from slamreplay.report.cells import Cell, Table, table
 from slamreplay.report.figures.consistency import drawn_parts
-from slamreplay.report.phrases import NOT_KNOWN, number, short
-from slamreplay.report.tables import Cell, Table, table
+from slamreplay.report.phrases import NOT_KNOWN, number, p_value, short
 
 Summaries = tuple[ConsistencySummary, ...]
 
@@ -26,8 +26,8 @@ def means(summaries: Summaries) -> Table:
             Cell(number(part.mean.ratio), _verdict(part)),
             f"{part.mean.n}",
             f"{part.mean.n_eff:.0f}",
-            _p(part.p_value),
-            _p(part.p_adjusted),
+            p_value(part.p_value),
+            p_value(part.p_adjusted),
         )
         for summary, part in _rows(summaries)
     ]
@@ -48,7 +48,7 @@ def coverage(summaries: Summaries) -> Table:
                 part.name,
                 *(f"{100 * share:.0f} %" for share in found.coverage),
                 Cell(short(found.distance), f"{short(found.most)} by chance"),
-                _p(found.p_value),
+                p_value(found.p_value),
                 NOT_KNOWN if index is None else number(index.nci, ".1f", "dB"),
                 NOT_KNOWN if index is None else number(index.inclination, "+.1f", "dB"),
             )
@@ -122,9 +122,3 @@ def _source(summary: ConsistencySummary) -> Cell:
 
 def _verdict(part: PartSummary) -> str:
     return "" if part.mean.sufficient else "too few to judge"
-
-
-def _p(value: float | None) -> str:
-    if value is None:
-        return NOT_KNOWN
-    return "< 1e-12" if value < 1e-12 else f"{value:.1g}"

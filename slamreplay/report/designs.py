@@ -5,6 +5,7 @@ from __future__ import annotations
 from slamreplay.evidence.result import Postmortem
 from slamreplay.replay.dose import Critical, DoseCurve, DoseResults
 from slamreplay.replay.dose_ranking import Margin, ranking
+from slamreplay.report.cells import Cell, Table, table
 from slamreplay.report.dose_tables import (
     broke_text,
     control_rows,
@@ -23,7 +24,6 @@ from slamreplay.report.model import (
     MarginPart,
 )
 from slamreplay.report.phrases import short
-from slamreplay.report.tables import Cell, Table, table
 from slamreplay.report.trial_curves import curves_of_trials
 
 

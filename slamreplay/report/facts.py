@@ -9,17 +9,19 @@ import numpy as np
 from slamreplay.evidence.result import Postmortem
 from slamreplay.geometry.times import NS_PER_S
 from slamreplay.report.figures.covariance import sigma_position_m
+from slamreplay.report.moments import moment_link
 from slamreplay.verdict.words import square_metres
 
 
 @dataclass(frozen=True)
 class Fact:
-    """One number, what it is, and what to hold it against."""
+    """One number, what it is, what to hold it against, and where the replay shows it."""
 
     number: str
     label: str
     detail: str
     alarming: bool = False
+    link: str = ""
 
 
 def deciding_facts(post: Postmortem) -> tuple[Fact, Fact, Fact]:
@@ -48,7 +50,11 @@ def _belief(post: Postmortem) -> Fact:
     sigma = sigma_position_m(post.belief)[worst]
     if np.isfinite(sigma):
         detail += f" The filter claimed ±{_length(float(sigma))} (1 sigma) at that moment."
-    return Fact(_length(float(error.distance_m[worst])), label, detail, alarming=lost_s > 0.0)
+    number, link = (
+        _length(float(error.distance_m[worst])),
+        moment_link(post, int(error.t_ns[worst])),
+    )
+    return Fact(number, label, detail, alarming=lost_s > 0.0, link=link)
 
 
 def _map(post: Postmortem) -> Fact:
@@ -73,7 +79,9 @@ def _map(post: Postmortem) -> Fact:
         f"{limits.changed_s:g} s); {regions}."
     )
     worst = sustained_peak(changes.t_ns, changes.changed_share, limits.changed_s)
-    return Fact(f"{100 * worst:.1f} %", label, detail, alarming=changed_s > 0.0)
+    peak = int(changes.t_ns[np.nanargmax(changes.changed_share)])
+    link = moment_link(post, peak) if changed_s > 0.0 else ""
+    return Fact(f"{100 * worst:.1f} %", label, detail, alarming=changed_s > 0.0, link=link)
 
 
 def _hindsight(post: Postmortem) -> Fact:

@@ -10,8 +10,8 @@ from slamreplay.consistency.innovations.whiteness import LEAST, whiteness
 from slamreplay.consistency.statistics.mean_test import MeanTest
 from slamreplay.evidence.ledger import LEDGER_FILE
 from slamreplay.evidence.result import Postmortem
+from slamreplay.report.cells import Cell, Table, table
 from slamreplay.report.phrases import NOT_KNOWN, number, percent
-from slamreplay.report.tables import Cell, Table, table
 
 _HEAD = ("estimator", "sensor", "axis", "innovations", "used", "mean NIS [1]",
          "correlation of successive ones [1]", "measured minus predicted")  # fmt: skip

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from slamreplay.evidence.result import Postmortem
+from slamreplay.report.cells import Cell, Table, table
 from slamreplay.report.model import AgePart, LatencyPart, UsagePart
 from slamreplay.report.phrases import NOT_KNOWN, number, percent
-from slamreplay.report.tables import Cell, Table, table
 from slamreplay.verdict.latency.latency import Usage
 from slamreplay.verdict.latency.spread import Spread
 

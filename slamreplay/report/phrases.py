@@ -46,6 +46,13 @@ def short(value: float | None) -> str:
     return number(value, ".0f" if value is not None and abs(value) >= 1000.0 else ".3g")
 
 
+def p_value(value: float | None) -> str:
+    """Of a test, or a dash."""
+    if value is None:
+        return NOT_KNOWN
+    return "< 1e-12" if value < 1e-12 else f"{value:.1g}"
+
+
 def span(post: Postmortem, start_ns: int | None, end_ns: int | None) -> str:
     """From when to when, in s since the log's start."""
     origin = post.manifest.start_ns

@@ -16,11 +16,13 @@ class Section:
         anchor: its id, and the name of its template.
         title: its heading.
         short: its name in the table of contents.
+        count: told beside it, 0 where nothing is counted.
     """
 
     anchor: str
     title: str
     short: str
+    count: int = 0
 
     @property
     def template(self) -> str:
@@ -30,13 +32,15 @@ class Section:
 
 def sections(page: Page, pictures: Mapping[str, object]) -> tuple[Section, ...]:
     """Those that have something to say, in the order of the questions that people ask."""
+    began = page.evidence or page.cause_note or page.failure_mode
+    found = sum(len(group.rows) + group.more for group in page.findings)
     every = (
         (True, Section("when", "When it happened", "When")),
-        (page.cause_note, Section("cause", "What it began with", "Cause")),
-        (True, Section("stops", "Where it stopped, and why", "Stops")),
-        (True, Section("findings", "Findings", "Findings")),
+        (began, Section("cause", "What it began with", "Cause")),
+        (True, Section("stops", "Where it stopped, and why", "Stops", len(page.stops.rows))),
+        (True, Section("findings", "Findings", "Findings", found)),
         (page.jumps.rows or page.trace_note,
-         Section("jumps", "Which measurement moved the belief", "Jumps")),
+         Section("jumps", "Which measurement moved the belief", "Jumps", len(page.jumps.rows))),
         (page.usages.rows, Section("pose-age", "How old was the pose?", "Pose age")),
         (True, Section("covariance", "Is the covariance honest?", "Covariance")),
         (page.means.rows, Section("consistency", "Consistency", "Consistency")),
@@ -45,8 +49,10 @@ def sections(page: Page, pictures: Mapping[str, object]) -> tuple[Section, ...]:
         (page.trials.rows, Section("trials", "Which evidence it depends on", "Trials")),
         (pictures["reliability"],
          Section("confidence", "What the confidence means", "Confidence")),
-        (page.missing or page.unasked,
+        (page.streams.rows, Section("audit", "Clocks and transforms", "Clocks, tf")),
+        (page.missing or page.unasked or page.lacking,
          Section("lacking", "What cannot be judged", "Not judged")),
         (True, Section("basis", "What this rests on", "Sources")),
+        (True, Section("ticket", "For a ticket", "Ticket")),
     )  # fmt: skip
     return tuple(section for told, section in every if told)

@@ -1,20 +1,17 @@
-"""The page's tables: plain cells from a post-mortem."""
+"""The page's tables of what happened, and of trials."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping
 
 import numpy as np
 
 from slamreplay.evidence.result import Postmortem
 from slamreplay.evidence.words import STATES
-from slamreplay.report.phrases import NOT_KNOWN, number, percent, seconds, short, span
+from slamreplay.report.cells import Cell, Table, table
+from slamreplay.report.moments import moment_cell, span_cell
+from slamreplay.report.phrases import NOT_KNOWN, number, percent, seconds, short
 from slamreplay.verdict.judgement import Consumed
-
-#: Rows of one table on the page; a file beside it has them all.
-MOST_ROWS = 40
-
 
 #: The metrics that have a column on the page, as it calls them; report.json has them all.
 _COLUMNS = {
@@ -31,54 +28,20 @@ _COLUMNS = {
 }
 
 
-@dataclass(frozen=True)
-class Cell:
-    """A cell's text, and a smaller line under it."""
-
-    text: str
-    aside: str = ""
-
-    @property
-    def width(self) -> str:
-        """How the cell wraps: short texts stay on one line, long ones get room."""
-        return "long" if len(self.text) > 28 else "short"
-
-
-@dataclass(frozen=True)
-class Table:
-    """Cells under a head, how many rows were left out, and the file that has them."""
-
-    head: tuple[str, ...]
-    rows: tuple[tuple[Cell, ...], ...]
-    more: int = 0
-    more_in: str = "report.json"
-
-
-def table(
-    head: tuple[str, ...], rows: Sequence[Sequence[str | Cell]], more_in: str = "report.json"
-) -> Table:
-    """A table of the first rows; the rest is counted, and named the file that has it.
-
-    Nothing is left out of a table that no file has: `more_in` is empty then.
-    """
-    most = MOST_ROWS if more_in else len(rows)
-    shown = tuple(
-        tuple(cell if isinstance(cell, Cell) else Cell(cell) for cell in row) for row in rows[:most]
-    )
-    return Table(head, shown, len(rows) - len(shown), more_in)
-
-
-def intervals(post: Postmortem) -> Table:
-    """What held when."""
+def intervals(post: Postmortem, anchors: Mapping[str, str]) -> Table:
+    """What held when, and why; `anchors` are those of the findings that the page lists."""
     rows = [
         (
             STATES[i.state].name,
-            span(post, i.start_ns, i.end_ns),
+            span_cell(post, i.start_ns, i.end_ns),
             seconds(i.duration_ns),
             percent(i.confidence),
             number(i.max_error_m, ".2f", "m"),
             number(None if i.max_error_rad is None else np.degrees(i.max_error_rad), ".0f", "deg"),
-            ", ".join(i.findings) or NOT_KNOWN,
+            Cell(
+                ", ".join(i.findings) or NOT_KNOWN,
+                links=tuple((name, f"#{anchors[name]}") for name in i.findings if name in anchors),
+            ),
         )
         for i in post.judgement.intervals
     ]
@@ -88,11 +51,10 @@ def intervals(post: Postmortem) -> Table:
 
 def stops(post: Postmortem) -> Table:
     """Unplanned stops."""
-    origin = post.manifest.start_ns
     rows = [
         (
             f"{k}",
-            seconds(s.t_ns - origin),
+            moment_cell(post, s.t_ns),
             NOT_KNOWN if s.x_m is None or s.y_m is None else f"{s.x_m:.2f}, {s.y_m:.2f} m",
             STATES[s.state].name,
             s.cause,
@@ -109,7 +71,7 @@ def actions(post: Postmortem) -> Table:
     words = {False: "no", None: "unknown", True: "yes"}
     rows = [
         (
-            seconds(a.t_ns - post.manifest.start_ns),
+            moment_cell(post, a.t_ns),
             a.kind,
             Cell(a.name, "inferred, not recorded" if a.inferred else ""),
             number(a.sigma_m, ".3f", "m"),
@@ -151,7 +113,7 @@ def regions(post: Postmortem) -> Table:
             )
             + ("" if r.map_version is None else f" in map {r.map_version[-8:]}"),
             number(r.area_m2, ".2f", "m²"),
-            span(post, r.first_seen_ns, r.last_seen_ns),
+            span_cell(post, r.first_seen_ns, r.last_seen_ns),
             f"{r.views}",
             percent(r.confidence),
         )

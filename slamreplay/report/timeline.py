@@ -8,6 +8,18 @@ from slamreplay.evidence.result import Postmortem
 from slamreplay.evidence.words import STATES
 from slamreplay.report.phrases import seconds, span
 
+#: A texture for each state, as a path over a tile of 8 by 8: colours alone do not tell them apart.
+HATCHES = {
+    "healthy": "",
+    "lost": "M-2 2L2-2M-2 10L10-2M6 10L10 6",
+    "map_changed": "M2 2h.01M6 6h.01",
+    "lost_and_map_changed": "M0 0L8 8M8 0L0 8",
+    "unobservable": "M4 0V8",
+    "insufficient_data": "M0 4H8",
+}
+#: So many stretches are told in words.
+_SPELT = 12
+
 
 @dataclass(frozen=True)
 class Band:
@@ -45,3 +57,12 @@ def marks(post: Postmortem) -> tuple[Band, ...]:
         )
         for k, s in enumerate(post.judgement.stops, start=1)
     )
+
+
+def timeline_alt(post: Postmortem) -> str:
+    """The timeline in words: the first stretches, and how many more there are."""
+    shown = bands(post)
+    text = "; ".join(band.title for band in shown[:_SPELT])
+    more = f"; and {len(shown) - _SPELT} more stretches" if len(shown) > _SPELT else ""
+    stops = "; ".join(mark.title for mark in marks(post)[:_SPELT])
+    return f"States over the log. {text}{more}. {stops}".rstrip()

@@ -7,8 +7,9 @@ import math
 from slamreplay.evidence.ledger import LEDGER_FILE, run_name
 from slamreplay.evidence.result import Postmortem
 from slamreplay.evidence.trace import RunTrace, Traced
+from slamreplay.report.cells import Cell, Table, table
+from slamreplay.report.moments import moment_cell
 from slamreplay.report.phrases import NOT_KNOWN, number, seconds, short
-from slamreplay.report.tables import Cell, Table, table
 
 _HEAD = ("when", "measured", "moved it by", "residual", "sigma of it", "NIS", "score", "used")
 #: Rows of one run on the page and in the terminal.
@@ -20,7 +21,7 @@ def jumps(post: Postmortem) -> Table:
     rows = [
         (
             run_name(trial),
-            seconds(jump.step.t_ns - post.manifest.start_ns),
+            moment_cell(post, jump.step.t_ns),
             _moved(jump.step.metres, jump.step.radians),
             _errors(jump.error_before_m, jump.error_after_m),
             jump.cause,
@@ -74,7 +75,7 @@ def _row(post: Postmortem, one: Traced) -> tuple[str | Cell, ...]:
     score, about = float(seen.score[one.row]), str(seen.about[one.row])
     what = about if about.startswith(seen.source) else f"{seen.source}: {about}".removesuffix(": ")
     return (
-        seconds(one.t_ns - post.manifest.start_ns),
+        moment_cell(post, one.t_ns),
         Cell(what, seen.frame_id),
         _moved(one.metres, one.radians),
         _numbers(residual, names, units),

@@ -61,24 +61,36 @@ def summary(bundle: Bundle) -> dict[str, Any]:
 def inspect(bundle: Bundle) -> dict[str, Any]:
     """The answers of `slamreplay inspect`: those of `summary`, and the audit.
 
-    Keys beside those of `summary`: clock, frames, lasers, placeholders, findings.
+    Keys beside those of `summary` and `clock_and_frames`: lasers, placeholders, findings.
     """
     context = CheckContext(None, (), bundle.view())
     whole = LogAudit(bundle.view(), bundle.table)  # its topics are told, references too
     found = ask([context], AUDITS)
-    clock = bundle.manifest.clock
     return {
         **summary(bundle),
-        "clock": {
-            "name": clock.name,
-            "reason": clock.reason,
-            "simulated": _simulated(context.audit),
-            "topics": _topics(whole),
-        },
-        "frames": frames_audit(context.audit),
+        **clock_and_frames(context.audit, whole),
         "lasers": {topic: asdict(told) for topic, told in context.audit.lasers.items()},
         "placeholders": [asdict(odd) for odd in context.audit.odd_numbers],
         "findings": [{**asdict(f), "title": f.title} for f in found],
+    }
+
+
+def clock_and_frames(audit: LogAudit, whole: LogAudit | None = None) -> dict[str, Any]:
+    """How the log's clocks and tf hold together, as plain data.
+
+    Args:
+        audit: of what a check may see.
+        whole: of all topics that are to be told; the same if not given.
+    """
+    clock = audit.view.manifest.clock
+    return {
+        "clock": {
+            "name": clock.name,
+            "reason": clock.reason,
+            "simulated": _simulated(audit),
+            "topics": _topics(whole or audit),
+        },
+        "frames": frames_audit(audit),
     }
 
 
