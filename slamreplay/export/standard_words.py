@@ -9,9 +9,9 @@ here.
 from __future__ import annotations
 
 _FRAMES = """
-map odom odometry base link footprint earth world laser lidar imu gps camera scan sensor
-optical frame wheel caster front rear back left right top bottom middle center centre upper
-lower horizontal vertical
+up down tilt pan mount track map odom odometry base link footprint earth world laser lidar imu
+gps camera scan sensor optical frame wheel caster front rear back left right top bottom middle
+center centre upper lower horizontal vertical
 """
 _TOPICS = """
 tf static clock rosout agg diagnostics diagnostic amcl mcl pose poses posestamped initialpose
