@@ -25,7 +25,7 @@ detection detections staging reliability failure probability alpha likelihood sc
 quality fitness transform nearest transformation localization localisation localizer localiser
 estimate estimated kinematic slam toolbox graph visualization constraint constraints list info
 ndt icp matching matcher match joy joystick teleop key keyboard nav mux target desired ref
-setpoint odom combined ekf ukf parameter parameters events transition event d
+setpoint odom combined ekf ukf parameter parameters events transition event
 """
 _NODES = """
 controller planner smoother behavior behaviour server navigator bt tree log lifecycle manager
