@@ -98,6 +98,12 @@ def type_stores():
     return {ros: type_store(ros) for ros in (1, 2)}
 
 
+@pytest.fixture(scope="session")
+def logs_in(type_stores):
+    """Gives a writer of logs for any folder, for fixtures that outlive one test."""
+    return lambda folder: LogWriter(folder, type_stores)
+
+
 @pytest.fixture
 def logs(tmp_path, type_stores) -> LogWriter:
     """Makes messages and writes them as a log of any format."""

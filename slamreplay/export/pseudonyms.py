@@ -25,12 +25,12 @@ class Pseudonyms:
         return known.setdefault(text, len(known) + 1)
 
     def topic(self, name: str) -> str:
-        """ "/acme_7/base_scan" gives "/robot_1/topic_1_scan": a namespace, then the topic's own."""
+        """A namespace, then the topic's own: /acme_7/base_scan as /robot_1/topic_1_scan."""
         *spaces, last = name.split("/")
         return "/".join([*(self.part(s, "robot") for s in spaces), self.part(last, "topic")])
 
     def frame(self, name: str) -> str:
-        """ "acme_7/left_eye" gives "robot_1/frame_1_left"."""
+        """As topics: acme_7/left_eye as robot_1/frame_1_left."""
         *spaces, last = name.split("/")
         return "/".join([*(self.part(s, "robot") for s in spaces), self.part(last, "frame")])
 
@@ -41,11 +41,13 @@ class Pseudonyms:
         words = tokens(part)
         known = [word for word in words if word in STANDARD_WORDS]
         digits = [word for word in words if word.isdigit()]
-        numbered = is_tag_frame(part) or all(len(d) == 1 for d in digits)
+        # A digit tells front laser 2 from 1, but also robot 7 from 6; long numbers tell more.
+        numbered = is_tag_frame(part) or all(len(d) == 1 and kind != "robot" for d in digits)
         if _PLAIN.fullmatch(part or "_") and len(known) + len(digits) == len(words) and numbered:
             new = part
         else:
-            new = "_".join([f"{kind}_{self.number(kind, part)}", *known])
+            meant = [word for word in known if word != kind]
+            new = "_".join([f"{kind}_{self.number(kind, part)}", *meant])
         self._given[part] = new
         return new
 

@@ -200,7 +200,7 @@ def _folder(entry: MapVersion) -> MapVersion:
 
 
 def _loss(loss: Loss, topic: Callable[[str], str]) -> Loss:
-    what = topic(loss.what) if loss.what.startswith("/") else "part of the log"
+    what = topic(loss.what.split()[0]) if loss.what.startswith("/") else "part of the log"
     return loss.model_copy(update={"what": what, "reason": "told in the report of the log itself"})
 
 

@@ -9,9 +9,9 @@ here.
 from __future__ import annotations
 
 _FRAMES = """
-map odom odometry base link footprint earth world laser lidar imu gps camera scan sensor
-optical frame wheel caster front rear back left right top bottom middle center centre upper
-lower horizontal vertical
+up down tilt pan mount track map odom odometry base link footprint earth world laser lidar imu
+gps camera scan sensor optical frame wheel caster front rear back left right top bottom middle
+center centre upper lower horizontal vertical
 """
 _TOPICS = """
 tf static clock rosout agg diagnostics diagnostic amcl mcl pose poses posestamped initialpose
@@ -25,7 +25,7 @@ detection detections staging reliability failure probability alpha likelihood sc
 quality fitness transform nearest transformation localization localisation localizer localiser
 estimate estimated kinematic slam toolbox graph visualization constraint constraints list info
 ndt icp matching matcher match joy joystick teleop key keyboard nav mux target desired ref
-setpoint odom combined ekf ukf parameter parameters events transition event d
+setpoint odom combined ekf ukf parameter parameters events transition event
 """
 _NODES = """
 controller planner smoother behavior behaviour server navigator bt tree log lifecycle manager

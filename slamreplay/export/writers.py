@@ -67,7 +67,9 @@ def _tum(request: Request, folder: Path) -> Sequence[NotWritten]:
 def _mcap(request: Request, folder: Path) -> Sequence[NotWritten]:
     missed: Sequence[NotWritten] = ()
     if request.recorded:
-        missed = import_module("slamreplay.export.recorded.writer").write_recorded(request, folder)
+        from slamreplay.export.recorded.writer import write_recorded
+
+        missed = write_recorded(request, folder)
     if request.post is not None:
         analysis = import_module("slamreplay.export.foxglove")
         analysis.write_foxglove(request.post, request.bundle.view(), folder, **_shared(request))

@@ -38,14 +38,23 @@ def enu_axes(latitude_deg: ArrayLike, longitude_deg: ArrayLike) -> Array:
 
 
 def enu_axes_at(earth_xyz: ArrayLike) -> Array:
-    """R (3, 3) of east, north and up at a position (3,) in `earth`.
+    """R (3, 3) of east, north and up at a position (3,) in `earth`."""
+    place = geodetic_from_earth(earth_xyz)
+    return enu_axes(place[0], place[1])
+
+
+def geodetic_from_earth(earth_xyz: ArrayLike) -> Array:
+    """Latitude, longitude (deg) and altitude (m) of positions (..., 3) in `earth`.
 
     The latitude is Bowring's (1976): good to far less than 1e-9 rad near the ground.
     """
-    x, y, z = np.asarray(earth_xyz, dtype=np.float64)
+    x, y, z = np.moveaxis(np.asarray(earth_xyz, dtype=np.float64), -1, 0)
     level = np.hypot(x, y)
     b = _A * (1.0 - _F)
     angle = np.arctan2(z * _A, level * b)
     second = _E2 / (1.0 - _E2)
     lat = np.arctan2(z + second * b * np.sin(angle) ** 3, level - _E2 * _A * np.cos(angle) ** 3)
-    return enu_axes(np.degrees(lat), np.degrees(np.arctan2(y, x)))
+    # Along the normal, which is well conditioned at the poles too.
+    normal = _A / np.sqrt(1.0 - _E2 * np.sin(lat) ** 2)
+    alt = level * np.cos(lat) + z * np.sin(lat) - normal * (1.0 - _E2 * np.sin(lat) ** 2)
+    return np.stack([np.degrees(lat), np.degrees(np.arctan2(y, x)), alt], axis=-1)

@@ -6,7 +6,7 @@ under a temporary name and renamed, so that it is whole or absent.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -54,7 +54,7 @@ def write_log(target: Path, make: Callable[[Messages], Sequence[Record]]) -> Non
                 hint="use .mcap, .db3, .bag, or no suffix for a rosbag2 folder",
             )
         check_target(target, FOLDER_MARKER)
-        store = _store(2)
+        store = type_store(2)
         log = make(Messages(store, 2))
         with atomic_folder(target, marker=FOLDER_MARKER) as work, _scratch(target) as scratch:
             _write_rosbag2(scratch / target.name, store, log, "mcap")
@@ -64,7 +64,7 @@ def write_log(target: Path, make: Callable[[Messages], Sequence[Record]]) -> Non
     if target.is_dir():
         raise OutputError("is a folder", where=target, hint="name another output with -o")
     ros_version, write = _FILES[target.suffix]
-    store = _store(ros_version)
+    store = type_store(ros_version)
     try:
         with _scratch(target) as scratch:
             log = make(Messages(store, ros_version))
@@ -73,7 +73,8 @@ def write_log(target: Path, make: Callable[[Messages], Sequence[Record]]) -> Non
         raise OutputError(f"cannot write: {error.strerror or error}", where=target) from error
 
 
-def _store(ros_version: int) -> Any:
+def type_store(ros_version: int) -> Any:
+    """Message classes of ROS 1 or 2, those included that rosbags lacks and we ship."""
     store = get_typestore(Stores.ROS2_JAZZY if ros_version == 2 else Stores.ROS1_NOETIC)
     for msgtype, text in {**DEFINITIONS, **LATER_DEFINITIONS}.items():
         if msgtype not in store.fielddefs:
@@ -90,12 +91,34 @@ def _scratch(target: Path) -> Iterator[Path]:
         yield Path(folder)
 
 
-def _write_mcap(path: Path, store: Any, log: Sequence[Record]) -> Path:
+def _write_mcap(path: Path, store: Any, log: Iterable[Record]) -> Path:
+    write_mcap(path, store, log, library=_LIBRARY)
+    return path
+
+
+def write_mcap(
+    path: Path,
+    store: Any,
+    log: Iterable[Record],
+    *,
+    library: str,
+    latched: Collection[str] | None = None,
+) -> None:
+    """One mcap file of profile ros2, chunk by chunk.
+
+    Args:
+        path: the file.
+        store: the type store that the messages' classes are from.
+        log: sorted by log time.
+        library: who writes it.
+        latched: topics whose last message late subscribers get; then every topic's quality of
+            service is told, as rosbag2 does, and a player offers it.
+    """
     from mcap.writer import CompressionType, Writer
 
     with path.open("wb") as stream:
         writer = Writer(stream, chunk_size=_CHUNK_BYTES, compression=CompressionType.ZSTD)
-        writer.start(profile="ros2", library=_LIBRARY)
+        writer.start(profile="ros2", library=library)
         schemas: dict[str, int] = {}
         channels: dict[str, int] = {}
         for record in log:
@@ -104,7 +127,10 @@ def _write_mcap(path: Path, store: Any, log: Sequence[Record]) -> Path:
                 text = store.generate_msgdef(name, ros_version=2)[0].encode()
                 schemas[name] = writer.register_schema(name, "ros2msg", text)
             if record.topic not in channels:
-                channels[record.topic] = writer.register_channel(record.topic, "cdr", schemas[name])
+                told = {} if latched is None else _offered(record.topic in latched)
+                channels[record.topic] = writer.register_channel(
+                    record.topic, "cdr", schemas[name], told
+                )
             writer.add_message(
                 channels[record.topic],
                 log_time=record.t_log_ns,
@@ -112,7 +138,13 @@ def _write_mcap(path: Path, store: Any, log: Sequence[Record]) -> Path:
                 data=bytes(store.serialize_cdr(record.message, name)),
             )
         writer.finish()
-    return path
+
+
+def _offered(is_latched: bool) -> dict[str, str]:
+    """A channel's metadata as rosbag2 writes it."""
+    from rosbags.rosbag2.metadata import dump_qos_v8
+
+    return {"offered_qos_profiles": dump_qos_v8(_qos(latched=is_latched))}
 
 
 def _write_db3(path: Path, store: Any, log: Sequence[Record]) -> Path:
@@ -133,7 +165,10 @@ def _write_rosbag2(path: Path, store: Any, log: Sequence[Record], storage: str) 
             name = _full_name(record.msgtype)
             if record.topic not in connections:
                 connections[record.topic] = writer.add_connection(
-                    record.topic, name, typestore=store, offered_qos_profiles=_qos(record.topic)
+                    record.topic,
+                    name,
+                    typestore=store,
+                    offered_qos_profiles=_qos(latched=record.topic in LATCHED),
                 )
             data = store.serialize_cdr(record.message, name)
             writer.write(connections[record.topic], record.t_log_ns, data)
@@ -170,8 +205,7 @@ def _full_name(msgtype: str) -> str:
     return f"{package}/msg/{name}"
 
 
-def _qos(topic: str) -> list[Qos]:
-    latched = topic in LATCHED
+def _qos(*, latched: bool) -> list[Qos]:
     forever = QosTime(9223372036, 854775807)
     return [
         Qos(
