@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from slamreplay.bundle.findings import FINDINGS
+from slamreplay.cli import completion
 from slamreplay.cli.options import Json
 from slamreplay.cli.terminal import say, say_json, say_labelled
 from slamreplay.errors import UsageError
@@ -22,7 +23,12 @@ def register(app: typer.Typer) -> None:
 
 
 def _explain(
-    id_: Annotated[str, typer.Argument(metavar="ID", help="A finding's id, as SR-LOC-001.")],
+    id_: Annotated[
+        str,
+        typer.Argument(
+            metavar="ID", help="A finding's id, as SR-LOC-001.", autocompletion=completion.findings
+        ),
+    ],
     as_json: Json = False,
 ) -> None:
     known = {name.lower(): name for name in FINDINGS}

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from slamreplay.cli import completion
 from slamreplay.cli.options import Json
 from slamreplay.cli.terminal import say, say_json, say_table
 from slamreplay.errors import UsageError
@@ -24,7 +25,12 @@ def register(app: typer.Typer) -> None:
 
 
 def _list(
-    kind: Annotated[str, typer.Argument(metavar="KIND", help=f"One of {', '.join(KINDS)}.")],
+    kind: Annotated[
+        str,
+        typer.Argument(
+            metavar="KIND", help=f"One of {', '.join(KINDS)}.", autocompletion=completion.kinds
+        ),
+    ],
     as_json: Json = False,
 ) -> None:
     if kind not in KINDS:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from slamreplay.cli import options
+from slamreplay.cli import completion, options
 from slamreplay.cli.terminal import complain, say_json, say_table
 from slamreplay.errors import UsageError
 
@@ -20,7 +20,13 @@ if TYPE_CHECKING:
 
 Estimators = Annotated[
     list[str] | None,
-    typer.Option("--estimator", "-e", metavar="NAME", help="Estimator; several by repeating it."),
+    typer.Option(
+        "--estimator",
+        "-e",
+        metavar="NAME",
+        help="Estimator; several by repeating it.",
+        autocompletion=completion.estimators,
+    ),
 ]
 Perturbations = Annotated[
     list[str] | None,
@@ -29,6 +35,7 @@ Perturbations = Annotated[
         "-p",
         metavar="NAME[.VARIANT]=LEVEL",
         help="One change, e.g. tf_delay=0.2; several by repeating it, each run by itself.",
+        autocompletion=completion.perturbations,
     ),
 ]
 Parameters = Annotated[
@@ -50,7 +57,12 @@ Logs = Annotated[
 ]
 Recipe = Annotated[
     Path | None,
-    typer.Option("--recipe", metavar="YAML", help="A question as a file, as in recipes/."),
+    typer.Option(
+        "--recipe",
+        metavar="YAML",
+        help="A question as a file, as in recipes/.",
+        autocompletion=completion.recipes,
+    ),
 ]
 Output = Annotated[Path, typer.Option("-o", "--output", metavar="RUNS", help="Folder to write.")]
 Seed = Annotated[

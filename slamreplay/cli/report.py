@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from slamreplay.bundle.findings import SEVERITIES, Severity
+from slamreplay.cli import completion
 from slamreplay.cli.options import (
     End,
     Json,
@@ -48,6 +49,7 @@ FailOn = Annotated[
         "--fail-on",
         metavar="SEVERITY",
         help="Exit with 1 on findings of info, warning or error, and of what is worse.",
+        autocompletion=completion.severities,
     ),
 ]
 UpdateMap = Annotated[
@@ -91,6 +93,7 @@ HoldOut = Annotated[
         "--hold-out",
         metavar="KIND",
         help="Keep fiducial, dock or gnss out of hindsight, so that it can judge it.",
+        autocompletion=completion.held_out,
     ),
 ]
 

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from slamreplay.cli import completion
 from slamreplay.cli.options import Json
 from slamreplay.cli.terminal import say_json, say_path
 from slamreplay.errors import UsageError
@@ -26,7 +27,10 @@ _HELP = (
 
 def _simulate(
     scenario: Annotated[
-        str | None, typer.Argument(metavar="SCENARIO", help="What happens; see above.")
+        str | None,
+        typer.Argument(
+            metavar="SCENARIO", help="What happens; see above.", autocompletion=completion.scenarios
+        ),
     ] = None,
     output: Annotated[
         Path | None,

@@ -8,21 +8,15 @@ from slamreplay.consistency.belief.jumps.check import sentence
 from slamreplay.evidence.ledger import run_name
 from slamreplay.evidence.result import Postmortem
 
-#: Jumps of one run that are told here; the report has all.
-_JUMPS = 3
-
 
 def jump_lines(post: Postmortem) -> Iterator[str]:
-    """The grave jumps of undisturbed runs, the largest first, and what made them.
+    """The largest grave jump of each undisturbed run, what made it, and how many more there are.
 
     A run that is made to break jumps all the time: that is in the report, and no news here.
     """
     for trial, found in post.jumps:
-        if trial.perturbation is not None:
-            continue
-        grave = sorted((j for j in found if j.step.is_grave), key=lambda j: -j.step.size)
-        for jump in grave[:_JUMPS]:
-            yield f"{run_name(trial)} jumped {sentence(jump, post.manifest.start_ns)}"
-        if len(grave) > _JUMPS:
-            more = len(grave) - _JUMPS
-            yield f"{run_name(trial)} jumped {more} more time{'s' if more > 1 else ''} as far"
+        grave = [jump for jump in found if trial.perturbation is None and jump.step.is_grave]
+        if grave:
+            largest = max(grave, key=lambda jump: jump.step.size)
+            more = f"; {len(grave) - 1} more in the report" if len(grave) > 1 else ""
+            yield f"{run_name(trial)} jumped {sentence(largest, post.manifest.start_ns)}{more}"
