@@ -20,7 +20,7 @@ UNASKED = -1
 _NOISE_M, _NEAR_M, _THROUGH_M = 0.05, 0.3, 0.3
 
 
-def what_was_met(recording: Recording) -> list[tuple[np.ndarray, np.ndarray]]:
+def truth_of_beams(recording: Recording) -> list[tuple[np.ndarray, np.ndarray]]:
     """Of each laser the stamps (N,) and (N, B) Met as it should be, or UNASKED."""
     r = recording
     lasers = [(r.scenario.lidar, r.scans, XYYAW_BASE_LASER)]

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from beam_truth import UNASKED, what_was_met
+from beam_truth import UNASKED, truth_of_beams
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -16,12 +16,16 @@ from slamreplay.bundle.view import Bundle
 from slamreplay.estimators.amcl.config import AmclConfig
 from slamreplay.evidence.scene import Met
 from slamreplay.evidence.scene_lanes import largest_sigma
+from slamreplay.evidence.scene_marks import scene_marks
 from slamreplay.evidence.scene_of import scene_of
 from slamreplay.evidence.scene_scans import chosen
 from slamreplay.geometry import se2
-from slamreplay.hindsight.beams import HIT, Beams
-from slamreplay.hindsight.met import TOGETHER_M, has_neighbour
+from slamreplay.hindsight.beams import HIT, INVALID, Beams
+from slamreplay.hindsight.changed_beams import BEYOND, MET, NEARER, SILENT, BeamsOnMap
+from slamreplay.hindsight.evidence import Lattice, Passes
+from slamreplay.hindsight.met import TOGETHER_M, has_neighbour, passing, what_was_met
 from slamreplay.hindsight.pipeline import hindsight
+from slamreplay.hindsight.standing import Standing
 from slamreplay.maps.grid import OccupancyGrid
 from slamreplay.postmortem import postmortem
 from slamreplay.simulate.bundled import bundle_of
@@ -34,7 +38,7 @@ from slamreplay.simulate.worlds import box, warehouse
 from slamreplay.testing.edits import rebuilt, with_maps, with_repeated_stamps, without
 from slamreplay.testing.synthetic import START_NS, room_grid, synthetic_bundle
 from slamreplay.testing.synthetic_rows import ns_of
-from slamreplay.verdict.judgement import ConstantOffset
+from slamreplay.verdict.judgement import ConstantOffset, Interval
 
 
 def room_with_a_box() -> OccupancyGrid:
@@ -80,6 +84,18 @@ def test_marks_stand_in_time_order_and_tell_when_the_robot_was_lost(boxed):
     assert [m.t_ns for m in marks] == sorted(m.t_ns for m in marks)
     assert post.seconds(lost.t_ns) == pytest.approx(5.0, abs=0.5)
     assert {"lost", "jump", "start", "finding"} <= {m.kind for m in marks}
+
+
+def test_stretches_that_follow_each_other_are_one(boxed):
+    view, post = boxed
+    states = ("healthy", "lost", "lost_and_map_changed", "map_changed", "healthy", "lost")
+    tiles = tuple(Interval(s, 10 * k, 10 * (k + 1)) for k, s in enumerate(states))
+    other = replace(post, judgement=replace(post.judgement, intervals=tiles))
+
+    spans = [(m.kind, m.t_ns, m.end_ns) for m in scene_marks(other, view) if m.end_ns is not None]
+
+    assert [s for s in spans if s[0] == "lost"] == [("lost", 10, 30), ("lost", 50, 60)]
+    assert [s for s in spans if s[0] == "map_changed"] == [("map_changed", 20, 40)]
 
 
 def test_lanes_are_as_long_as_their_times_and_carry_the_verdicts_limits(boxed):
@@ -136,7 +152,7 @@ def told():
 def test_beams_are_classed_by_what_they_met(told):
     recording, view = told
     found = hindsight(view)
-    truth = {t_ns[0]: (t_ns, met) for t_ns, met in what_was_met(recording)}
+    truth = {t_ns[0]: (t_ns, met) for t_ns, met in truth_of_beams(recording)}
     confusion = np.zeros((len(Met), len(Met)), dtype=int)
 
     assert len(found.changes.met) == 2
@@ -211,6 +227,68 @@ def test_beams_with_a_neighbour_equal_their_plain_twin(seed):
                 if 0 <= other < 8 and those[s, b] and those[s, other]:
                     expected[s, b] |= np.hypot(*(ends[s, b] - ends[s, other])) <= TOGETHER_M
     assert np.array_equal(has_neighbour(beams, those), expected)
+
+
+#: One scan from (0.55, 0.15) along y, five beams side by side; evidence cells of 0.1 m.
+LATTICE = Lattice((10, 10), 1, 10, 0.1, np.zeros(2), np.zeros(1, dtype=np.int32))
+POSE = np.array([[0.55, 0.15, np.pi / 2.0]])
+END = (5, 5)  # row and column in which the beams end
+
+
+def passes_by(empty: list[tuple[int, int]], stood: list[tuple[int, int]] = ()) -> bool:
+    """Whether what a beam met passed by: cells that were empty once, and that something held."""
+    slots, count = np.full((10, 10), -1, dtype=np.int32), np.zeros((10, 10), dtype=np.uint16)
+    for k, cell in enumerate(stood):
+        slots[cell] = k
+    for cell in empty:
+        count[cell] = 2
+    hold = np.ones((len(stood), 1), dtype=bool)
+    new = Standing(slots, hold, hold, ~hold, np.ones(len(stood)), np.zeros(len(stood)))
+    where = np.array([[END[0] * 10 + END[1]]], dtype=np.int32)
+    nearer = np.full((1, 1), NEARER, dtype=np.int8)
+    laid = BeamsOnMap(nearer, where, np.zeros((1, 1), dtype=bool), np.zeros((1, 1), np.float32))
+    ends = np.array([[[0.4, 0.0]]], dtype=np.float32)
+    beams = Beams(np.zeros(1, np.int64), ends, np.full((1, 1), HIT, np.int8), np.zeros(2))
+    passed = Passes(np.zeros((0, 1), dtype=bool), slots, count)
+    return bool(passing(LATTICE, beams, POSE, laid, new, passed)[0, 0])
+
+
+def test_what_passed_by_left_its_place_empty():
+    behind, beside = (7, 5), (6, 6)
+
+    assert passes_by([END, behind])
+    assert not passes_by([])  # nobody ever looked through there: it may stand still
+    assert not passes_by([behind])
+    assert not passes_by([END])  # the face of something, which other beams grazed
+    assert not passes_by([END, behind], [beside])  # the edge of what stood then
+    assert passes_by([END, behind], [(8, 5)])
+
+
+def test_classes_in_the_order_of_what_is_known():
+    """Of one scan: met, near a wall, moving twice, moving alone, new, gone, silent, invalid."""
+    says = np.array([[MET, NEARER, NEARER, NEARER, BEYOND, NEARER, NEARER, BEYOND, SILENT, MET]])
+    n = says.shape[1]
+    laid = BeamsOnMap(says, says, says > 0, says)
+    ends = np.stack([np.arange(n) * 0.1, np.zeros(n)], axis=-1)[None].astype(np.float32)
+    ends[0, 6:] += 1.0
+    kind = np.full((1, n), HIT, dtype=np.int8)
+    kind[0, -1] = INVALID
+    flags = np.zeros((4, 1, n), dtype=bool)
+    near, is_new, is_gone, may_pass = flags
+    near[0, 1] = is_new[0, 6] = is_gone[0, 7] = may_pass[0, [2, 3, 5]] = True
+
+    met = what_was_met(
+        Beams(np.zeros(1, np.int64), ends, kind, np.zeros(2)),
+        laid,
+        near,
+        (is_new, is_gone),
+        may_pass,
+    )
+
+    assert [Met(code).name for code in met[0]] == [
+        "MAPPED", "MAPPED", "MOVING", "MOVING", "OTHER", "OTHER", "APPEARED", "REMOVED", "OTHER",
+        "INVALID",
+    ]  # fmt: skip
 
 
 def test_each_floor_has_its_beams_classed_in_its_own_map():

@@ -53,7 +53,7 @@ class SceneScans:
 
 @dataclass(frozen=True, eq=False)
 class SceneClouds:
-    """Particles of the localizer where they were recorded.
+    """Particles of the localizer where they were recorded, its own map frame's offset taken out.
 
     Attributes:
         t_ns: (M,) times of the clouds.
@@ -68,7 +68,7 @@ class SceneClouds:
 
 @dataclass(frozen=True, eq=False)
 class ScenePlans:
-    """Paths that a planner sent, in the map frame, as `SceneClouds` without headings.
+    """Paths that a planner sent, as `SceneClouds` without headings.
 
     Attributes:
         t_ns: (M,) times.
