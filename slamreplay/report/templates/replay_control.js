@@ -206,11 +206,12 @@ function offerLayers() {
   const { tracks, head } = scene;
   const seen = new Set();
   for (const scans of scene.scans) for (const one of scans.met) seen.add(one);
-  const met = (kinds) => kinds.some((kind) => seen.has(kind));
+  const laid = tracks.hindsight || tracks.odometry;
+  const met = (kinds) => laid && kinds.some((kind) => seen.has(kind));
   const has = {
     belief: tracks.belief, hindsight: tracks.hindsight, odometry: tracks.odometry,
     "scan-belief": tracks.belief && scene.scans.length,
-    "scan-hindsight": (tracks.hindsight || tracks.odometry) && scene.scans.length,
+    "scan-hindsight": laid && scene.scans.length,
     uncertainty: Object.values(tracks).some((track) => track.ellipse),
     particles: scene.particles, plan: scene.plans, map: scene.ground, stops: head.stops.length,
     changes: head.regions.length || (scene.ground && scene.ground.codes.some((code) => code > 3)),
@@ -218,6 +219,9 @@ function offerLayers() {
     "met-removed": met([REMOVED, REMOVED_UNSEEN]), "met-other": met([OTHER]),
   };
   for (const label of section.querySelectorAll("[data-layer]")) label.hidden = !has[label.dataset.layer];
+  if (tracks.odometry) {
+    section.querySelector('[data-layer="scan-hindsight"] span').textContent = "scan, laid where odometry leads";
+  }
   readLayers();
 }
 
@@ -321,7 +325,11 @@ function listen() {
   find("time").addEventListener("input", (event) => seek(Number(event.target.value)));
   find("speed").addEventListener("change", (event) => { player.speed = Number(event.target.value); });
   section.addEventListener("change", (event) => { if (event.target.name === "layer") readLayers(); });
-  new ResizeObserver(() => { sharpSize(); redraw(); }).observe(section);
+  new ResizeObserver(() => {
+    if (section.hasAttribute("data-paper")) return; // what is drawn is stretched onto the paper
+    sharpSize();
+    redraw();
+  }).observe(section);
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", readInks);
   new MutationObserver(readInks).observe(document.documentElement, { attributes: true });
   addEventListener("beforeprint", () => forPaper(true));

@@ -244,11 +244,12 @@ function drawPoints(context, player, scans, row, pose, wanted, colour, shape, si
     } else { context.moveTo(x + half, y); context.arc(x, y, half, 0, 2 * Math.PI); }
   }
   if (shape === "plus") { context.lineWidth = 1; context.stroke(); return; }
+  if (shape !== "dot" && shape !== "square") { // a rim below all of them: a crowd keeps its colour
+    context.lineWidth = 2;
+    context.strokeStyle = player.inks.ink;
+    context.stroke();
+  }
   context.fill();
-  if (shape === "dot" || shape === "square") return;
-  context.lineWidth = 1;
-  context.strokeStyle = player.inks.ink;
-  context.stroke();
 }
 
 // A beam that went through a wall that is gone: the whole ray tells of it, not its end.
@@ -368,8 +369,9 @@ function drawLink(context, player, { belief, hindsight }) {
   const { view, inks, scene } = player;
   const [x0, y0] = toScreen(view, belief.x, belief.y);
   const [x1, y1] = toScreen(view, hindsight.x, hindsight.y);
-  const apart = Math.hypot(belief.x - hindsight.x, belief.y - hindsight.y);
-  const limit = scene.lanes.find((lane) => lane.key === "error_m");
+  const lane = scene.lanes.find((one) => one.key === "error_m");
+  const told = lane ? laneAt(lane, player.t) : null; // the same number as in the words
+  const apart = told === null ? Math.hypot(belief.x - hindsight.x, belief.y - hindsight.y) : told;
   if (Math.hypot(x1 - x0, y1 - y0) < 6) return;
   context.strokeStyle = inks.paper;
   context.lineWidth = 4;
@@ -380,7 +382,9 @@ function drawLink(context, player, { belief, hindsight }) {
   context.strokeStyle = inks.ink;
   context.lineWidth = 1.8;
   context.stroke();
-  if (apart < 0.2 * ((limit && limit.limit) || 0.5)) return;
+  const seen = Math.min(x0, x1) < view.width && Math.max(x0, x1) > 0
+    && Math.min(y0, y1) < view.height && Math.max(y0, y1) > 0;
+  if (!seen || apart < 0.2 * ((lane && lane.limit) || 0.5)) return;
   context.font = `700 13px ${inks.font}`;
   const text = `${apart.toFixed(2)} m apart`;
   const [mx, my] = [(x0 + x1) / 2, (y0 + y1) / 2];
