@@ -17,6 +17,7 @@ from slamreplay.report.figures import canvas
 from slamreplay.report.figures.panels import PANELS
 from slamreplay.report.page import Page, page
 from slamreplay.report.phrases import bound
+from slamreplay.report.print_style import print_style
 from slamreplay.report.replay.replay import replay_of
 from slamreplay.report.sections import sections
 
@@ -48,7 +49,7 @@ def html(post: Postmortem) -> str:
     """The whole page. Whatever came from the log is escaped by the template engine."""
     view = page(post)
     replay = replay_of(post)
-    styles = _texts(_STYLES)
+    styles = [*_texts(_STYLES), print_style(view.title)]
     scripts = [] if replay is None else ["\n".join(_texts(_SCRIPTS))]
     environment = Environment(
         loader=PackageLoader("slamreplay.report", "templates"),
