@@ -11,7 +11,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 from matplotlib.figure import Figure
 
-from slamreplay.evidence.clean import clean
+from slamreplay.evidence.clean import clean, straight
 from slamreplay.evidence.result import Postmortem
 from slamreplay.report.figures import canvas
 from slamreplay.report.figures.panels import PANELS
@@ -69,7 +69,7 @@ def html(post: Postmortem) -> str:
         scripts=scripts,
         **pictures,
     )
-    return clean(text)
+    return straight(clean(text))
 
 
 def _texts(names: tuple[str, ...]) -> list[str]:
