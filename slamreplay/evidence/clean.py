@@ -11,3 +11,12 @@ _UNFIT = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 def clean(text: str) -> str:
     """The text with unfit characters replaced by U+FFFD."""
     return _UNFIT.sub("\N{REPLACEMENT CHARACTER}", text)
+
+
+# Unicode Standard Annex 9: embeddings, overrides and isolates turn the order of what follows.
+_TURNS = re.compile("[\u202a-\u202e\u2066-\u2069]")
+
+
+def straight(text: str) -> str:
+    """The text with marks that turn its direction spelt out, as "[U+202E]": a name cannot hide."""
+    return _TURNS.sub(lambda found: f"[U+{ord(found[0]):04X}]", text)

@@ -11,12 +11,13 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 from matplotlib.figure import Figure
 
-from slamreplay.evidence.clean import clean
+from slamreplay.evidence.clean import clean, straight
 from slamreplay.evidence.result import Postmortem
 from slamreplay.report.figures import canvas
 from slamreplay.report.figures.panels import PANELS
 from slamreplay.report.page import Page, page
 from slamreplay.report.phrases import bound
+from slamreplay.report.print_style import print_style
 from slamreplay.report.replay.replay import replay_of
 from slamreplay.report.sections import sections
 
@@ -48,7 +49,7 @@ def html(post: Postmortem) -> str:
     """The whole page. Whatever came from the log is escaped by the template engine."""
     view = page(post)
     replay = replay_of(post)
-    styles = _texts(_STYLES)
+    styles = [*_texts(_STYLES), print_style(view.title)]
     scripts = [] if replay is None else ["\n".join(_texts(_SCRIPTS))]
     environment = Environment(
         loader=PackageLoader("slamreplay.report", "templates"),
@@ -68,7 +69,7 @@ def html(post: Postmortem) -> str:
         scripts=scripts,
         **pictures,
     )
-    return clean(text)
+    return straight(clean(text))
 
 
 def _texts(names: tuple[str, ...]) -> list[str]:

@@ -24,6 +24,9 @@ from slamreplay.report.figures.canvas import (
     Part,
 )
 
+#: A letter's width in its height, typically.
+_LETTER = 0.62
+
 
 def course_figure(post: Postmortem, width_in: float) -> Figure | None:
     """Error over time with state bands and the share of changed beams; None without either."""
@@ -57,6 +60,8 @@ def _draw(
     canvas.dress(axes, "time since start [s]", curve(axes, post), size)
     axes.set_xlim(0.0, max(end_s, 1e-3))
     _bands(axes, post)
+    if curve is _distance or post.error is None:
+        _name_bands(axes, post, size - 1.5)
     seen = dict.fromkeys(i.state for i in post.judgement.intervals)
     handles: list[object] = [
         Patch(color=STATE_COLOURS[s], alpha=0.35, label=STATES[s].name) for s in seen
@@ -83,6 +88,22 @@ def _bands(axes: Axes, post: Postmortem) -> None:
         axes.axvline(at_s, color=INK, linestyle=":", linewidth=1.2, zorder=3)
 
 
+def _name_bands(axes: Axes, post: Postmortem, size: float) -> None:
+    """Each state's name on its stretches, where it fits: colours alone do not tell them apart."""
+    whole = max(post.manifest.end_ns - post.manifest.start_ns, 1)
+    figure = axes.get_figure(root=True)
+    assert figure is not None  # of any axes
+    wide_in = float(figure.get_figwidth() * axes.get_position().width)
+    for interval in post.judgement.intervals:
+        name = STATES[interval.state].name
+        if interval.duration_ns / whole * wide_in > _LETTER * size / 72.0 * (len(name) + 1):
+            middle = post.seconds(np.int64((interval.start_ns + interval.end_ns) // 2))
+            axes.text(
+                float(middle), 0.98, name, fontsize=size, color=INK, ha="center", va="top",
+                transform=axes.get_xaxis_transform(), zorder=5,
+            )  # fmt: skip
+
+
 def _limit(axes: Axes, value: float) -> None:
     axes.axhline(value, color=INK, linestyle="--", linewidth=1.0, zorder=3)
 
@@ -93,7 +114,7 @@ def _curve(axes: Axes, post: Postmortem, values: np.ndarray, limit: float) -> No
     axes.plot(t, y, color=BLUE, linewidth=1.4, zorder=4)
     _limit(axes, limit)
     top = np.nanmax(y) if np.isfinite(y).any() else 0.0
-    axes.set_ylim(0.0, 1.15 * max(float(top), limit))
+    axes.set_ylim(0.0, 1.25 * max(float(top), limit))
 
 
 def _distance(axes: Axes, post: Postmortem) -> str:

@@ -147,7 +147,7 @@ def _draw_nees(axes: Axes, post: Postmortem, size: float) -> list[object]:
     axes.plot(
         s,
         np.maximum(value, floor),
-        ".-" if len(s) < 300 else "-",
+        ".-" if len(s) < 80 else "-",
         color=INK,
         lw=0.8,
         ms=2.5,
