@@ -6,8 +6,14 @@ import re
 
 # XML 1.0 section 2.2: no control characters but tab and line ends, no surrogates, escaped or not.
 _UNFIT = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+_MARKS = re.compile(r"[\\`*_\[\]<>|#~&$]")
 
 
 def clean(text: str) -> str:
     """The text with unfit characters replaced by U+FFFD."""
     return _UNFIT.sub("\N{REPLACEMENT CHARACTER}", text)
+
+
+def as_markdown(text: str) -> str:
+    """Markdown that shows the text as it is: what a log wrote is no markup."""
+    return _MARKS.sub(r"\\\g<0>", text)
