@@ -51,10 +51,10 @@ def ingest(
     >>> import slamreplay as sr
     >>> log = sr.ingest("sample_logs/healthy_short.bag")
     >>> log
-    <LogBundle healthy_short.bag: 18.8 s, 8 tables, missing: imu, costmap, recovery>
+    <LogBundle healthy_short.bag: 18.8 s, 12 tables, missing: nothing>
     >>> odometry = log.tables["odometry"]
     >>> odometry[["t_s", "position_x", "linear_velocity_x"]].iloc[-1].round(2).tolist()
-    [18.75, 13.4, 0.5]
+    [18.84, 12.14, 0.0]
     >>> odometry.attrs["units"]["linear_velocity_x"]
     'm/s'
     """

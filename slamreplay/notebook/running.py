@@ -55,7 +55,7 @@ def perturb(
     >>> runs.table[["perturbation", "level"]].values.tolist()
     [[None, nan], ['tf_delay.odometry', 0.3]]
     >>> runs.trajectory(1)[["t_s", "x_m"]].shape
-    (188, 2)
+    (187, 2)
     """
     from slamreplay.bundle.atomic import check_target
     from slamreplay.caches import cache_folder, run_folder
