@@ -23,6 +23,10 @@ class SlamreplayError(Exception):
         line = line if self.hint is None else f"{line} (hint: {self.hint})"
         return " ".join(line.split())
 
+    def _render_traceback_(self) -> list[str]:
+        """What IPython shows: where in our code it was found out is of no use to a reader."""
+        return [f"{type(self).__name__}: {self}"]
+
 
 class LogError(SlamreplayError):
     """A log that cannot be read, or that holds nothing to work with."""

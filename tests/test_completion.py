@@ -9,8 +9,8 @@ import pytest
 
 from slamreplay.bundle.findings import FINDINGS, SEVERITIES
 from slamreplay.bundle.view import SENSED_KINDS
+from slamreplay.catalogue import KINDS
 from slamreplay.cli.completion import HELD_OUT
-from slamreplay.cli.list_ import KINDS
 from slamreplay.estimators import ESTIMATORS
 from slamreplay.perturb import PERTURBATIONS, VARIANTS
 from slamreplay.simulate import SCENARIOS

@@ -5,8 +5,8 @@ import tempfile
 
 import pytest
 
-from slamreplay.cli.kernel_cache import VARIABLE, keep_kernels
-from slamreplay.cli.main import cache_folder
+from slamreplay.caches import cache_folder
+from slamreplay.kernel_cache import VARIABLE, keep_kernels
 
 
 @pytest.fixture(autouse=True)

@@ -40,8 +40,8 @@ def run_budget(
     Raises:
         UsageError: neither log nor scenario, or an option that has no meaning here.
     """
+    from slamreplay.caches import run_folder
     from slamreplay.cli.lab import show
-    from slamreplay.cli.main import run_folder
     from slamreplay.cli.progress import progress_bar
     from slamreplay.cli.scenario import log_or_scenario
     from slamreplay.labs.folder import check_results_target, write_results

@@ -35,7 +35,7 @@ def findings() -> list[tuple[str, str]]:
 
 def kinds() -> list[str]:
     """Kinds for `list`."""
-    from slamreplay.cli.list_ import KINDS
+    from slamreplay.catalogue import KINDS
 
     return list(KINDS)
 

@@ -48,7 +48,7 @@ def run_design(
         UsageError: no log and no scenario, or a name that there is not.
     """
     from slamreplay.bundle.atomic import check_target
-    from slamreplay.cli.main import cache_folder, watch_folder
+    from slamreplay.caches import cache_folder, watch_folder
     from slamreplay.cli.progress import progress_bar
     from slamreplay.cli.scenario import log_or_scenario
     from slamreplay.doses.answer import answer

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import asdict
-from difflib import get_close_matches
 from typing import Annotated
 
 import typer
 
-from slamreplay.bundle.findings import FINDINGS
+from slamreplay.catalogue import explanation_of
 from slamreplay.cli import completion
 from slamreplay.cli.options import Json
 from slamreplay.cli.terminal import say, say_json, say_labelled
-from slamreplay.errors import UsageError
 
 
 def register(app: typer.Typer) -> None:
@@ -31,13 +29,7 @@ def _explain(
     ],
     as_json: Json = False,
 ) -> None:
-    known = {name.lower(): name for name in FINDINGS}
-    if id_.lower() not in known:
-        near = get_close_matches(id_.upper(), FINDINGS, n=1)
-        hint = f"did you mean '{near[0]}'?" if near else "'slamreplay list findings' has them all"
-        raise UsageError(f"there is no finding '{id_}'", hint=hint)
-    name = known[id_.lower()]
-    explanation = FINDINGS[name]
+    name, explanation = explanation_of(id_)
     if as_json:
         say_json({"id": name, **asdict(explanation)})
         return

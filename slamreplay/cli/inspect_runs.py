@@ -33,7 +33,7 @@ def answers_of(path: Path) -> dict[str, Any] | None:
     Raises:
         BundleError: a folder of runs that is damaged.
     """
-    from slamreplay.cli.main import watch_folder
+    from slamreplay.caches import watch_folder
     from slamreplay.replay.folder import is_runs, read_runs
     from slamreplay.replay.watch import TrialState, look
 

@@ -3,20 +3,14 @@
 from __future__ import annotations
 
 from itertools import groupby
-from math import isfinite
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
+from slamreplay.catalogue import KINDS, catalogue
 from slamreplay.cli import completion
 from slamreplay.cli.options import Json
 from slamreplay.cli.terminal import say, say_json, say_table
-from slamreplay.errors import UsageError
-
-if TYPE_CHECKING:
-    from slamreplay.registry import Registry
-
-KINDS = ("estimators", "perturbations", "checks", "decoders", "scenarios", "findings", "labs")
 
 
 def register(app: typer.Typer) -> None:
@@ -33,9 +27,7 @@ def _list(
     ],
     as_json: Json = False,
 ) -> None:
-    if kind not in KINDS:
-        raise UsageError(f"there is no list of '{kind}'", hint=f"there are: {', '.join(KINDS)}")
-    rows = _rows(kind)
+    rows = catalogue(kind)
     if as_json:
         say_json(rows)
         return
@@ -45,56 +37,6 @@ def _list(
     columns = list(rows[0]) if rows else []
     heads = ["" if key == "doc" else key for key in columns]
     say_table([heads, *([str(row[key]) for key in columns] for row in rows)], with_head=False)
-
-
-def _rows(kind: str) -> list[dict[str, object]]:
-    """One row per thing, with its name and one line about it."""
-    if kind == "scenarios":
-        from slamreplay.simulate import SCENARIOS
-
-        return [{"name": name, "doc": doc} for name, doc in SCENARIOS.items()]
-    if kind == "findings":
-        from slamreplay.bundle.findings import FINDINGS
-
-        return [{"name": name, "doc": what.title} for name, what in FINDINGS.items()]
-    if kind == "perturbations":
-        return _perturbations()
-    registry = _registry(kind)
-    rows: list[dict[str, object]] = []
-    for name in registry:
-        thing = registry.load(name)
-        if kind == "decoders":
-            rows.append({"name": name, "doc": f"to table {thing.table}"})
-        elif kind == "estimators":
-            needs = ", ".join(sorted(thing.needs))
-            rows.append({"name": name, "needs": needs, "doc": _first_line(thing)})
-        else:
-            rows.append({"name": name, "doc": _first_line(thing)})
-    return rows
-
-
-def _perturbations() -> list[dict[str, object]]:
-    """A row per variant, with the unit and the baseline its level is given in."""
-    from slamreplay.perturb import PERTURBATIONS
-
-    rows: list[dict[str, object]] = []
-    for name in PERTURBATIONS:
-        perturbation = PERTURBATIONS.load(name)
-        for variant, about in perturbation.variants.items():
-            rows.append(
-                {
-                    "name": f"{name}.{variant}",
-                    "unit": about.unit,
-                    "baseline": about.baseline,
-                    "low": about.low,
-                    "high": about.high if isfinite(about.high) else None,
-                    "is_switch": about.is_switch,
-                    "touches": sorted(perturbation.touches),
-                    "about": _first_line(perturbation),
-                    "doc": about.doc,
-                }
-            )
-    return rows
 
 
 def _show_grouped(rows: list[dict[str, object]]) -> None:
@@ -134,26 +76,3 @@ def _level(row: dict[str, object]) -> str:
         return "0 or 1"
     to = f"{row['low']:g} up" if row["high"] is None else f"{row['low']:g} to {row['high']:g}"
     return f"{row['unit']}, {row['baseline']:g} ({to})"
-
-
-def _registry(kind: str) -> Registry:
-    if kind == "estimators":
-        from slamreplay.estimators import ESTIMATORS
-
-        return ESTIMATORS
-    if kind == "checks":
-        from slamreplay.consistency import CHECKS
-
-        return CHECKS
-    if kind == "labs":
-        from slamreplay.labs import LABS
-
-        return LABS
-    from slamreplay.ingest import DECODERS
-
-    return DECODERS
-
-
-def _first_line(thing: object) -> str:
-    text = (thing.__doc__ or "").strip()
-    return text.splitlines()[0] if text else ""

@@ -14,9 +14,10 @@ from typing import Annotated, Any
 import typer
 
 from slamreplay import __version__
-from slamreplay.cli.kernel_cache import keep_kernels
+from slamreplay.caches import cache_folder
 from slamreplay.cli.terminal import complain, settle_streams
 from slamreplay.errors import SlamreplayError
+from slamreplay.kernel_cache import keep_kernels
 
 #: Exit codes of design: 1 is raised by the commands that were asked to judge (`--fail-on`).
 EXIT_INPUT, EXIT_FAULT, EXIT_INTERRUPTED = 2, 70, 130
@@ -108,30 +109,6 @@ def _crash_file() -> Path:
             continue
         return folder / name
     return Path(os.devnull)
-
-
-def cache_folder() -> Path:
-    """`$XDG_CACHE_HOME/slamreplay`, by default under ~/.cache; without a home temporary."""
-    named = os.environ.get("XDG_CACHE_HOME")
-    try:
-        return (Path(named) if named else Path.home() / ".cache") / "slamreplay"
-    except RuntimeError:
-        return Path(tempfile.gettempdir()) / "slamreplay"
-
-
-def run_folder() -> Path:
-    """Where runs are kept by the hash of all they depend on."""
-    return cache_folder() / "runs"
-
-
-def bundle_folder() -> Path:
-    """Where bundles of raw logs are kept for the commands that ask more than once."""
-    return cache_folder() / "bundles"
-
-
-def watch_folder() -> Path:
-    """Where `perturb` tells how far it is, and `inspect` looks."""
-    return cache_folder() / "watch"
 
 
 if __name__ == "__main__":

@@ -162,7 +162,7 @@ def perturb(
         raise UsageError("there is no LOG to replay", hint="name one, or a lab with --recipe")
     from slamreplay.bundle.atomic import check_target
     from slamreplay.bundle.kept import kept
-    from slamreplay.cli.main import bundle_folder, cache_folder, run_folder, watch_folder
+    from slamreplay.caches import bundle_folder, cache_folder, run_folder, watch_folder
     from slamreplay.cli.progress import progress_bar
     from slamreplay.estimators import ESTIMATORS
     from slamreplay.replay.design import design, parse_perturbation, usual_estimators
@@ -207,11 +207,8 @@ def perturb(
 
 
 def _rows(bundle: Bundle, runs: Sequence[Run]) -> list[dict[str, Any]]:
-    from slamreplay.consistency.evidence.references import references_of
-    from slamreplay.replay.metrics import trial_metrics
-    from slamreplay.report.metrics import asked_of, nees_metrics
+    from slamreplay.report.metrics import metrics_of_runs
 
-    view, references = bundle.view(), references_of(bundle, None)
     return [
         {
             "estimator": run.trial.estimator,
@@ -220,12 +217,9 @@ def _rows(bundle: Bundle, runs: Sequence[Run]) -> list[dict[str, Any]]:
             "unit": run.trial.unit,
             "parameters": run.trial.given,
             "not_applicable": run.not_applicable,
-            "metrics": {
-                **trial_metrics(run, runs, bundle),
-                **nees_metrics(asked_of(run, references, view)),
-            },
+            "metrics": metrics,
         }
-        for run in runs
+        for run, metrics in zip(runs, metrics_of_runs(bundle, runs), strict=True)
     ]
 
 

@@ -30,8 +30,8 @@ def log_or_scenario(
     Raises:
         UsageError: neither log nor scenario, or options of a log with a scenario.
     """
+    from slamreplay.caches import bundle_folder
     from slamreplay.cli import options
-    from slamreplay.cli.main import bundle_folder
     from slamreplay.ingest.bundle_cache import made_once
     from slamreplay.ingest.options import IngestOptions
 

@@ -6,6 +6,7 @@ import re
 
 # XML 1.0 section 2.2: no control characters but tab and line ends, no surrogates, escaped or not.
 _UNFIT = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+_MARKS = re.compile(r"[\\`*_\[\]<>|#~&$]")
 
 
 def clean(text: str) -> str:
@@ -20,3 +21,8 @@ _TURNS = re.compile("[\u202a-\u202e\u2066-\u2069]")
 def straight(text: str) -> str:
     """The text with marks that turn its direction spelt out, as "[U+202E]": a name cannot hide."""
     return _TURNS.sub(lambda found: f"[U+{ord(found[0]):04X}]", text)
+
+
+def as_markdown(text: str) -> str:
+    """Markdown that shows the text as it is: what a log wrote is no markup."""
+    return _MARKS.sub(r"\\\g<0>", text)

@@ -1,1 +1,5 @@
 """What slamreplay found, in the formats of other tools."""
+
+from slamreplay.stage import callable_stage
+
+callable_stage(__name__)

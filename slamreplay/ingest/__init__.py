@@ -11,6 +11,7 @@ adds), for each row the message it came from and its stamp, and what was repaire
 from __future__ import annotations
 
 from slamreplay.registry import Registry
+from slamreplay.stage import callable_stage
 
 _HERE = "slamreplay.ingest.decoders"
 _BEHAVIOURS = ("Spin", "BackUp", "Wait", "DriveOnHeading", "AssistedTeleop")
@@ -129,3 +130,5 @@ DECODERS = Registry(
         "foxglove_msgs/msg/Log": f"{_HERE}.foxglove:LOG",
     },
 )
+
+callable_stage(__name__)

@@ -1,6 +1,7 @@
 """Perturbations: one named change to the evidence with one level."""
 
 from slamreplay.registry import Registry
+from slamreplay.stage import callable_stage
 
 _HERE = "slamreplay.perturb"
 
@@ -83,3 +84,5 @@ VARIANTS: dict[str, tuple[str, ...]] = {
         "start_deg_as_rad",
     ),
 }
+
+callable_stage(__name__)

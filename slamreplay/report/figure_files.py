@@ -13,6 +13,7 @@ from pathlib import Path
 from slamreplay import __version__
 from slamreplay.bundle.atomic import atomic_folder, check_target
 from slamreplay.errors import UsageError
+from slamreplay.evidence.clean import as_markdown
 from slamreplay.evidence.result import Postmortem
 from slamreplay.report.figures import canvas
 from slamreplay.report.figures.panels import PANELS, Panel, caption
@@ -87,11 +88,5 @@ def _files(post: Postmortem, panel: Panel) -> dict[str, bytes] | None:
 
 def _captions(listed: list[dict[str, object]]) -> str:
     """A heading and a paragraph for each figure; what a log wrote is no markup."""
-    told = [f"## {x['name']}: {x['title']}\n\n{_plain(str(x['caption']))}\n" for x in listed]
+    told = [f"## {x['name']}: {x['title']}\n\n{as_markdown(str(x['caption']))}\n" for x in listed]
     return "\n".join(["# Captions\n", *told])
-
-
-def _plain(text: str) -> str:
-    """Markdown that shows the text as it is."""
-    marks = "\\`*_[]<>|#~&$"
-    return "".join(f"\\{letter}" if letter in marks else letter for letter in text)

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from slamreplay.bundle.run import Run
 from slamreplay.bundle.track import PoseTrack
-from slamreplay.bundle.view import BundleView
+from slamreplay.bundle.view import Bundle, BundleView
 from slamreplay.consistency.belief.credibility import nees_of_belief
 from slamreplay.consistency.context import CheckContext
 from slamreplay.consistency.evidence.nees import nees
+from slamreplay.consistency.evidence.references import references_of
 from slamreplay.consistency.evidence.source import Reference
+from slamreplay.replay.metrics import trial_metrics
 from slamreplay.replay.reported import as_published
 from slamreplay.verdict.limits import Limits
 
@@ -65,6 +69,22 @@ def run_metrics(
             metrics["hindsight_max_rad"] = float(turn.max())
             metrics["lost_share"] = float(off.mean())
     return {**metrics, **nees_metrics(asked)}
+
+
+def metrics_of_runs(bundle: Bundle, runs: Sequence[Run]) -> list[dict[str, float | None]]:
+    """Numbers of runs laid beside each other, without looking back on the log.
+
+    Each against the undisturbed run of its estimator and the log's own references: those of
+    `trial_metrics` and `nees_metrics`.
+    """
+    view, references = bundle.view(), references_of(bundle, None)
+    return [
+        {
+            **trial_metrics(run, runs, bundle),
+            **nees_metrics(asked_of(run, references, view)),
+        }
+        for run in runs
+    ]
 
 
 def nees_metrics(asked: CheckContext) -> dict[str, float | None]:

@@ -1,5 +1,7 @@
 """A small simulator: worlds, a robot, its sensors and faults, and logs whose truth is known."""
 
+from slamreplay.stage import callable_stage
+
 #: Every scenario with what happens in it; the details stand in `scenarios`.
 SCENARIOS = {
     "healthy": "A round through a warehouse as mapped; one person walks about.",
@@ -13,3 +15,5 @@ SCENARIOS = {
     "corridor_100m": "One round of 100 m through the corridors of an office, back to the start.",
     "barcode_floor": "A drive unit on codes in the floor: some worn, some misread, none for 15 s.",
 }
+
+callable_stage(__name__)
