@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 import rerun as rr
 
@@ -22,8 +24,6 @@ from slamreplay.export.rerun.batches import (
 from slamreplay.export.rerun.sink import Sink
 from slamreplay.export.shown import Shown, poses_at
 
-#: Rows that are laid out at a time.
-_ROWS = 1024
 _BEAMS = np.array([rgba(colours.BEAMS[met]) for met in sorted(Met)], dtype=np.uint32)
 
 
@@ -35,6 +35,8 @@ def draw_robots(shown: Shown, sink: Sink) -> None:
     ):
         if track is not None:
             _draw_robot(f"map/{name}", track, colour, shown, sink)
+    for number, pieces_of_scans in enumerate(shown.lasers, start=1):
+        _draw_scans(number, pieces_of_scans(), shown, sink)
     _draw_parting(shown, sink)
     _draw_particles_and_plans(shown, sink)
     for name, track in shown.runs:
@@ -61,24 +63,28 @@ def _draw_robot(entity: str, track: PoseTrack, colour: str, shown: Shown, sink: 
         return
     edge = closed(shown.scene.footprint_xy, 0.04)
     sink.always(f"{entity}/footprint", rr.LineStrips3D([edge], colors=[rgba(colour)]))
-    for number, scans in enumerate(shown.scene.scans, start=1):
-        name = f"{entity}/scan" if number == 1 else f"{entity}/scan_{number}"
-        _draw_scans(name, scans, track, shown, sink)
-        sink.always(name, point_look(2.0))
 
 
-def _draw_scans(entity: str, scans: SceneScans, track: PoseTrack, shown: Shown, sink: Sink) -> None:
-    """Returns in the base frame; none while nobody knows where that is."""
-    rows = shown.rows(scans.t_ns)
-    for first in range(rows.start, rows.stop, _ROWS):
-        part = slice(first, min(first + _ROWS, rows.stop))
-        is_known = np.asarray(np.isfinite(poses_at(track, scans.t_ns[part])).all(axis=1))
-        kept = scans.is_hit[part] & is_known[:, None]
-        columns = rr.Points3D.columns(
-            positions=in_space(scans.ends_m[part][kept], 0.02),
-            colors=_BEAMS[scans.met[part][kept]],
-        )
-        sink.send(entity, scans.t_ns[part], columns.partition(kept.sum(axis=1)))
+def _draw_scans(number: int, pieces: Iterable[SceneScans], shown: Shown, sink: Sink) -> None:
+    """Returns in the base frame of each robot; none while nobody knows where that is."""
+    name = "scan" if number == 1 else f"scan_{number}"
+    robots = [
+        (f"map/{robot}/{name}", track)
+        for robot, track in (("belief", shown.belief), ("hindsight", shown.hindsight))
+        if track is not None
+    ]
+    for scans in pieces:
+        rows = shown.rows(scans.t_ns)
+        for entity, track in robots:
+            is_known = np.isfinite(poses_at(track, scans.t_ns[rows])).all(axis=1)
+            kept = scans.is_hit[rows] & np.asarray(is_known)[:, None]
+            columns = rr.Points3D.columns(
+                positions=in_space(scans.ends_m[rows][kept], 0.02),
+                colors=_BEAMS[scans.met[rows][kept]],
+            )
+            sink.send(entity, scans.t_ns[rows], columns.partition(kept.sum(axis=1)))
+    for entity, _ in robots:
+        sink.always(entity, point_look(2.0))
 
 
 def _draw_path(entity: str, track: PoseTrack, sink: Sink, colour: str = colours.PURPLE) -> None:
