@@ -18,11 +18,14 @@ from scipy import stats
 from slamreplay.errors import SlamreplayError
 from slamreplay.evidence import colours
 from slamreplay.evidence.scene import Met
+from slamreplay.evidence.scene_of import scene_of
+from slamreplay.evidence.scene_scans import scans_in_pieces, scene_scans
 from slamreplay.export.foxglove import write_foxglove
 from slamreplay.geometry import se2
 from slamreplay.geometry.times import NS_PER_S
 from slamreplay.ingest.pipeline import ingest
-from slamreplay.testing.synthetic import START_NS
+from slamreplay.postmortem import postmortem
+from slamreplay.testing.synthetic import START_NS, synthetic_bundle
 
 TYPES = {
     PackedElementField.FLOAT32: "<f4",
@@ -367,3 +370,37 @@ def test_our_own_export_holds_no_evidence(read, tmp_path):
     """It is no log: reading it as one says so in one line."""
     with pytest.raises(SlamreplayError, match="no scan and no odometry"):
         ingest([read.path], tmp_path / "b")
+
+
+@pytest.fixture(scope="module")
+def looked_back():
+    """A log that was really looked back on, its scene thinned out."""
+    bundle = synthetic_bundle(seconds=4.0)
+    post = postmortem(bundle, cause=False, scene=False)
+    return bundle, replace(post, scene=scene_of(post, bundle.view(), most_scans=9))
+
+
+def test_scans_that_a_scene_left_out_are_written_too(looked_back, tmp_path):
+    bundle, post = looked_back
+    read = written((bundle, post, ()), tmp_path)
+    (whole,) = scene_scans(post, bundle.view(), (), None)
+    clouds = read["hindsight/scan"]
+
+    assert len(post.scene.scans[0].t_ns) < len(whole.t_ns) == len(clouds)
+    for row, (t_ns, cloud) in enumerate(clouds):
+        hit = whole.is_hit[row]
+        assert t_ns == whole.t_ns[row]
+        assert table(cloud)["met"].tolist() == whole.met[row][hit].tolist()
+        np.testing.assert_array_equal(table(cloud)["x"], whole.ends_m[row][hit, 0])
+
+
+def test_pieces_of_scans_are_the_whole(looked_back):
+    bundle, post = looked_back
+    view = bundle.view()
+    (whole,) = scene_scans(post, view, (), None)
+    parts = list(scans_in_pieces(post, view, 0, slice(3, 38), most=7))
+
+    assert [len(p.t_ns) for p in parts] == [7, 7, 7, 7, 7]
+    for name in ("t_ns", "ends_m", "is_hit", "met"):
+        joined = np.concatenate([getattr(p, name) for p in parts])
+        np.testing.assert_array_equal(joined, getattr(whole, name)[3:38])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -46,6 +46,29 @@ def scene_scans(
         told = changes.met[k] if changes is not None and k < len(changes.met) else None
         found.append(_of_one(post, _only(laser, own), told))
     return tuple(found)
+
+
+def scans_in_pieces(
+    post: Postmortem, view: BundleView, number: int, rows: slice, most: int = 512
+) -> Iterator[SceneScans]:
+    """All scans of one laser, a few hundred at a time: those of a long log fill the memory.
+
+    Args:
+        post: what was found.
+        view: the log.
+        number: of the laser, from 0.
+        rows: which of its scans, by time.
+        most: about so many in a piece; scans of one and the same time are not parted.
+    """
+    laser = scan_sets(view)[number]
+    changes = None if post.hindsight is None else post.hindsight.changes
+    told = changes.met[number] if changes is not None and number < len(changes.met) else None
+    first, stop, _ = rows.indices(len(laser))
+    while first < stop:
+        last_ns = laser.t_ns[min(first + most, stop) - 1]
+        end = min(int(np.searchsorted(laser.t_ns, last_ns, side="right")), stop)
+        yield _of_one(post, _only(laser, np.arange(first, end)), told)
+        first = end
 
 
 def chosen(

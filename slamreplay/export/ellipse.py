@@ -12,7 +12,7 @@ from slamreplay.geometry.se2 import Array
 RADIUS_SQUARED_95 = -2.0 * np.log(0.05)
 
 
-def outlines(xyyaw: Array, cov: Array, points: int = 24) -> Array:
+def outlines(xyyaw: Array, cov: Array, points: int = 32) -> Array:
     """(N, K, 2) points on the 95 % ellipses of position, m; NaN where there is no covariance.
 
     The image of a circle under the Cholesky factor is the ellipse, whatever way it is turned.

@@ -5,17 +5,21 @@ Both writers for viewers draw from this, so that they show the same at the same 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
 from slamreplay.bundle.products import ChangedRegion
 from slamreplay.bundle.run import Run
+from slamreplay.bundle.scans import scan_sets
 from slamreplay.bundle.track import PoseTrack
 from slamreplay.bundle.view import BundleView
 from slamreplay.evidence.result import Postmortem
-from slamreplay.evidence.scene import Lane, Scene, SceneClouds, ScenePlans
+from slamreplay.evidence.scene import Lane, Scene, SceneClouds, ScenePlans, SceneScans
+from slamreplay.evidence.scene_paths import scene_clouds, scene_plans
+from slamreplay.evidence.scene_scans import scans_in_pieces
 from slamreplay.export.tum import trial_name
 from slamreplay.geometry import se2
 from slamreplay.geometry.times import Times
@@ -47,6 +51,7 @@ class Shown:
         stops: unplanned stops whose place is known, with their numbers on the report's page.
         states: the log's states, cut at the window.
         scene: what there was to see, None where nobody asked.
+        lasers: by laser what it saw, piece by piece, all of its scans; nothing without a scene.
         redact: takes names out of texts that may come from the log.
     """
 
@@ -63,6 +68,7 @@ class Shown:
     stops: tuple[tuple[int, Stop], ...]
     states: tuple[Interval, ...]
     scene: Scene | None
+    lasers: tuple[Callable[[], Iterator[SceneScans]], ...]
     redact: Redact
 
     def has(self, t_ns: int) -> bool:
@@ -114,6 +120,13 @@ def shown(
         for run in runs
         if run.estimate is not None
     ]
+    scene = post.scene
+    if scene is not None:  # a page shows some of these, a tool that can take its time all of them
+        scene = replace(
+            scene,
+            clouds=scene_clouds(post, view, None) or scene.clouds,
+            plans=scene_plans(post, view, None) or scene.plans,
+        )
     hindsight = post.hindsight
     changes = None if hindsight is None else hindsight.changes
     regions = () if changes is None else changes.regions
@@ -145,7 +158,8 @@ def shown(
             for i in post.judgement.intervals
             if i.start_ns <= end_ns and i.end_ns > start_ns
         ),
-        scene=post.scene,
+        scene=scene,
+        lasers=_lasers(post, view, place_ns, end_ns),
         redact=redact,
     )
 
@@ -168,6 +182,25 @@ def _cut(track: PoseTrack | None, start_ns: int, end_ns: int) -> PoseTrack | Non
     rows = np.flatnonzero((track.t_ns >= start_ns) & (track.t_ns <= end_ns))
     cut = track.take(rows[np.argsort(track.t_ns[rows], kind="stable")])
     return cut if cut.has_pose.any() else None
+
+
+def _lasers(
+    post: Postmortem, view: BundleView, start_ns: int, end_ns: int
+) -> tuple[Callable[[], Iterator[SceneScans]], ...]:
+    """What each laser of the scene saw; of scans that the scene left out, too."""
+    found: list[Callable[[], Iterator[SceneScans]]] = []
+    every = () if post.scene is None else scan_sets(view)
+    for number, scans in enumerate(() if post.scene is None else post.scene.scans):
+        if number < len(every) and len(every[number]) > len(scans.t_ns):
+            t_ns = every[number].t_ns
+            rows = slice(
+                int(np.searchsorted(t_ns, start_ns)),
+                int(np.searchsorted(t_ns, end_ns, side="right")),
+            )
+            found.append(partial(scans_in_pieces, post, view, number, rows))
+        else:
+            found.append(partial(iter, (scans,)))
+    return tuple(found)
 
 
 def _maps(

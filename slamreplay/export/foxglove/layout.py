@@ -12,24 +12,24 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import numpy as np
-
 from slamreplay.evidence import colours
 from slamreplay.evidence.scene import Lane, LaneKey
 from slamreplay.evidence.words import STATES
 from slamreplay.export.foxglove import topics
+from slamreplay.export.plane import from_above
 from slamreplay.export.shown import BASE_BELIEVED, BASE_HINDSIGHT, Shown
-from slamreplay.geometry.se2 import Array
 
-_GROUND = "#16191d"
-#: Around the map; width over height of the panel on a usual screen.
-_MARGIN_M, _ASPECT = 1.0, 1.6
+#: Width over height of the panel on a usual screen.
+_ASPECT = 1.6
 #: Lanes of one unit share a plot: title, lanes and their colours.
 _PLOTS: tuple[tuple[str, dict[LaneKey, str]], ...] = (
-    ("Error and sigma [m]", {"error_m": colours.VERMILLION, "sigma_m": colours.SKY}),
+    ("Error (red) and sigma (blue) [m]", {"error_m": colours.VERMILLION, "sigma_m": colours.SKY}),
     ("Heading error [deg]", {"error_deg": colours.VERMILLION}),
     ("NEES", {"nees": colours.PURPLE}),
-    ("Share of changed beams, match", {"changed_share": colours.ORANGE, "match": colours.GREEN}),
+    (
+        "Share of changed beams (orange), match (green)",
+        {"changed_share": colours.ORANGE, "match": colours.GREEN},
+    ),
 )
 Config = dict[str, Any]
 
@@ -95,7 +95,7 @@ def _titled(title: str) -> Config:
 
 
 def _scene(shown: Shown, schemas: Mapping[str, str]) -> Config:
-    centre, height = _where_to_look(shown)
+    centre, height = from_above(shown, _ASPECT)
     return {
         "cameraState": {
             "perspective": False,
@@ -112,7 +112,7 @@ def _scene(shown: Shown, schemas: Mapping[str, str]) -> Config:
         "followMode": "follow-pose",
         "followTf": shown.frame_id,
         "scene": {
-            "backgroundColor": _GROUND,
+            "backgroundColor": colours.GROUND,
             "transforms": {"showLabel": False, "axisScale": 0.5, "lineWidth": 0},
         },
         "transforms": {
@@ -159,20 +159,6 @@ def _drawn(topic: str, schema: str, shown: Shown) -> Config | None:
     return None
 
 
-def _where_to_look(shown: Shown) -> tuple[Array, float]:
-    """Centre (2,) of what there is to see and how high the picture has to be, m."""
-    tracks = [t for t in (shown.belief, shown.hindsight) if t is not None]
-    points = [t.xyyaw[t.has_pose, :2] for t in tracks]
-    points += [grid.centre_of(np.argwhere(grid.occupied)) for _, grid in shown.maps]
-    points = [p for p in points if len(p)]
-    if not points:
-        return np.zeros(2), 30.0
-    low = np.min([p.min(axis=0) for p in points], axis=0)
-    high = np.max([p.max(axis=0) for p in points], axis=0)
-    width, height = (high - low) + 2.0 * _MARGIN_M
-    return (low + high) / 2.0, float(max(height, width / _ASPECT))
-
-
 def _states() -> Config:
     known = [
         {"value": state, "label": STATES[state].name, "color": colour}
@@ -208,8 +194,8 @@ def _plot(title: str, lanes: Sequence[tuple[Lane, str]]) -> Config:
             paths.append({**common, **limit, "color": colours.GREY})
     return {
         "paths": paths,
-        "showLegend": True,
-        "legendDisplay": "top",
+        "showLegend": False,  # it would cover half of a plot this small; titles say it,
+        "legendDisplay": "floating",
         "showPlotValuesInLegend": False,
         "showXAxisLabels": True,
         "showYAxisLabels": True,

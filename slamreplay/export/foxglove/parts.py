@@ -19,7 +19,7 @@ from foxglove_schemas_protobuf.TextPrimitive_pb2 import TextPrimitive
 from foxglove_schemas_protobuf.Vector3_pb2 import Vector3
 from google.protobuf.message import Message
 from google.protobuf.timestamp_pb2 import Timestamp
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from slamreplay.evidence.colours import rgb
 from slamreplay.geometry.se2 import Array
@@ -99,10 +99,3 @@ def update(*entities: SceneEntity) -> SceneUpdate:
         timestamp=entities[0].timestamp if entities else None, type=SceneEntityDeletion.ALL
     )
     return SceneUpdate(deletions=[everything], entities=entities)
-
-
-def pieces(xy: Array) -> list[NDArray[np.float64]]:
-    """Stretches of two or more known points of a path (N, 2) with NaN rows."""
-    known = np.isfinite(xy).all(axis=1)
-    edges = np.flatnonzero(np.diff(known.astype(np.int8), prepend=0, append=0))
-    return [xy[a:b] for a, b in edges.reshape(-1, 2) if b - a > 1]

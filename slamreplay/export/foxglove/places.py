@@ -27,6 +27,7 @@ from slamreplay.export.foxglove.parts import (
     text,
     update,
 )
+from slamreplay.export.plane import box_corners
 from slamreplay.export.shown import Shown
 from slamreplay.geometry.se2 import Array
 from slamreplay.maps.grid import OccupancyGrid
@@ -35,8 +36,6 @@ from slamreplay.maps.grid import OccupancyGrid
 _RGBA = [(name, "u1") for name in ("red", "green", "blue", "alpha")]
 _MAP = np.dtype([*_RGBA, ("occupancy", "i1")])
 _CHANGE = np.dtype([*_RGBA, ("change", "u1")])
-#: On a dark ground, where both yellow and blue can be seen.
-_FREE, _WALL = "#2d333a", "#c3cad1"
 
 
 def places(shown: Shown) -> Iterator[Stream]:
@@ -51,8 +50,8 @@ def _maps(shown: Shown) -> Stream:
     for t_ns, grid in shown.maps:
         cells = np.zeros(grid.cells.shape, dtype=_MAP)
         cells["occupancy"] = grid.cells
-        _paint(cells, grid.free, _FREE)
-        _paint(cells, grid.occupied, _WALL)
+        _paint(cells, grid.free, colours.FREE)
+        _paint(cells, grid.occupied, colours.WALL)
         between = ~(grid.free | grid.occupied) & (grid.cells >= 0)
         _paint(cells, between, colours.GREY)
         yield t_ns, topics.MAP, _grid(t_ns, shown, cells, grid, grid.origin_xyyaw, -0.03)
@@ -103,7 +102,7 @@ def _regions(shown: Shown) -> Stream:
 def _region(region: ChangedRegion, name: str, t_ns: int, frame: str) -> SceneEntity:
     hexadecimal = colours.YELLOW if region.kind == "removed" else colours.ORANGE
     boxes = [region.bbox_m] if region.from_bbox_m is None else [region.bbox_m, region.from_bbox_m]
-    lines = [line(_corners(box), hexadecimal, width_px=1.5, is_loop=True) for box in boxes]
+    lines = [line(box_corners(box), hexadecimal, width_px=1.5, is_loop=True) for box in boxes]
     if region.from_bbox_m is not None:
         ends = np.array([np.reshape(box, (2, 2)).mean(axis=0) for box in reversed(boxes)])
         lines.append(line(ends, hexadecimal, width_px=1.0))
@@ -122,13 +121,6 @@ def _region(region: ChangedRegion, name: str, t_ns: int, frame: str) -> SceneEnt
         metadata=[KeyValuePair(key=key, value=value) for key, value in facts.items()],
         lines=lines,
         texts=[text(region.kind, np.array(region.bbox_m[2:]), hexadecimal, size_px=12.0)],
-    )
-
-
-def _corners(box: tuple[float, float, float, float]) -> Array:
-    x0, y0, x1, y1 = box
-    return np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]]) + 0.1 * np.array(
-        [[-1, -1], [1, -1], [1, 1], [-1, 1]]
     )
 
 

@@ -15,7 +15,8 @@ from slamreplay.bundle.track import PoseTrack
 from slamreplay.evidence import colours
 from slamreplay.export.ellipse import outlines
 from slamreplay.export.foxglove import topics
-from slamreplay.export.foxglove.parts import Stream, line, pieces, pose, quaternion, stamp, update
+from slamreplay.export.foxglove.parts import Stream, line, pose, quaternion, stamp, update
+from slamreplay.export.plane import pieces
 from slamreplay.export.shown import BASE_BELIEVED, BASE_HINDSIGHT, Shown
 
 #: Rows whose ellipses are worked out at a time.

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 from foxglove_schemas_protobuf.PointCloud_pb2 import PointCloud
 from foxglove_schemas_protobuf.SceneEntity_pb2 import SceneEntity
 from numpy.typing import NDArray
 
-from slamreplay.bundle.track import PoseTrack
 from slamreplay.evidence import colours
 from slamreplay.evidence.scene import SceneClouds, ScenePlans, SceneScans
 from slamreplay.export.foxglove import topics
@@ -24,7 +23,6 @@ _BEAM = np.dtype(
 #: Particles are points and not poses: viewers draw a thousand arrows slowly.
 _PARTICLE = np.dtype([(name, "<f4") for name in ("x", "y", "z", "yaw")])
 _RGB = np.array([colours.rgb(colours.BEAMS[met]) for met in sorted(colours.BEAMS)], dtype=np.uint8)
-_ROWS = 1024
 
 
 def seen(shown: Shown) -> Iterator[Stream]:
@@ -32,41 +30,43 @@ def seen(shown: Shown) -> Iterator[Stream]:
     scene = shown.scene
     if scene is None:
         return
-    for number, scans in enumerate(scene.scans, start=1):
-        for robot, track in ((topics.BELIEF, shown.belief), (topics.HINDSIGHT, shown.hindsight)):
-            if track is not None:
-                yield _scans(topics.scan(robot, number), scans, track, shown)
+    for number, pieces in enumerate(shown.lasers, start=1):
+        yield _scans(number, pieces(), shown)
     if scene.clouds is not None:
         yield _particles(scene.clouds, shown)
     if scene.plans is not None:
         yield _plans(scene.plans, shown)
 
 
-def _scans(topic: str, scans: SceneScans, track: PoseTrack, shown: Shown) -> Stream:
-    """Each scan in the map frame, its origin the robot's pose at that moment.
+def _scans(number: int, pieces: Iterable[SceneScans], shown: Shown) -> Stream:
+    """Each scan in the map frame, its origin the pose of one robot and of the other."""
+    robots = [
+        (topics.scan(robot, number), track)
+        for robot, track in ((topics.BELIEF, shown.belief), (topics.HINDSIGHT, shown.hindsight))
+        if track is not None
+    ]
+    is_drawn = [False] * len(robots)
+    for scans in pieces:
+        rows = shown.rows(scans.t_ns)
+        poses = [poses_at(track, scans.t_ns) for _, track in robots]
+        for row in range(rows.start, rows.stop):
+            beams = _beams(scans, row)
+            for k, (topic, _) in enumerate(robots):
+                t_ns, at = int(scans.t_ns[row]), poses[k][row]
+                is_known = bool(np.isfinite(at).all())
+                if is_known:
+                    yield t_ns, topic, _cloud(t_ns, shown.frame_id, at, beams)
+                elif is_drawn[k]:  # what was drawn before is taken away
+                    yield t_ns, topic, _cloud(t_ns, shown.frame_id, np.zeros(3), beams[:0])
+                is_drawn[k] = is_known
 
-    Where the pose is unknown one empty cloud takes away what was drawn before.
-    """
-    rows = shown.rows(scans.t_ns)
-    is_drawn = False
-    for first in range(rows.start, rows.stop, _ROWS):
-        part = slice(first, min(first + _ROWS, rows.stop))
-        poses = poses_at(track, scans.t_ns[part])
-        for k, t_ns in enumerate(scans.t_ns[part].tolist()):
-            is_known = bool(np.isfinite(poses[k]).all())
-            if not (is_known or is_drawn):
-                continue
-            row = first + k
-            kept = scans.is_hit[row] if is_known else np.zeros_like(scans.is_hit[row])
-            beams = _beams(scans.ends_m[row][kept], scans.met[row][kept])
-            at = poses[k] if is_known else np.zeros(3)
-            yield t_ns, topic, _cloud(t_ns, shown.frame_id, at, beams)
-            is_drawn = is_known
 
-
-def _beams(ends_m: NDArray[np.float32], met: NDArray[np.uint8]) -> NDArray:
+def _beams(scans: SceneScans, row: int) -> NDArray:
+    """What returned."""
+    hit = scans.is_hit[row]
+    met = scans.met[row][hit]
     beams = np.zeros(len(met), dtype=_BEAM)
-    beams["x"], beams["y"] = ends_m.T
+    beams["x"], beams["y"] = scans.ends_m[row][hit].T
     for channel, name in enumerate(("red", "green", "blue")):
         beams[name] = _RGB[met, channel]
     beams["alpha"], beams["met"] = 255, met
