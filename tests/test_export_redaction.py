@@ -54,7 +54,10 @@ def contents(folder):
                     yield message.data
 
 
-@pytest.mark.parametrize("to", [("mcap", "--only", "recorded"), ("tum", "--covariance")])
+@pytest.mark.parametrize(
+    "to",
+    [("mcap", "--only", "recorded"), ("tum", "--covariance"), ("csv", "--only", "recorded")],
+)
 def test_nothing_that_identifies_is_left(bundle, tmp_path, to):
     ran = call(bundle.path, "--to", *to, "--redact", "--json", "-o", tmp_path / "out")
     assert ran.exit_code == 0, ran.output
@@ -109,8 +112,8 @@ def test_runs_are_redacted_with_the_bundle(bundle):
         f"{SECRET}_7/map", f"{SECRET}_7/base_link", np.array([1]), np.zeros((1, 3))
     )
     measured = (np.array([1]), np.zeros((1, 2)), np.eye(2)[None], np.array([True]))
-    told = Innovations("scans", *measured,
-                       frame_id=f"{SECRET}_7/map", about=np.array([f"{SECRET}_7/laser"]))  # fmt: skip
+    about = np.array([f"{SECRET}_7/laser"])
+    told = Innovations("scans", *measured, frame_id=f"{SECRET}_7/map", about=about)
     parameters = json.dumps({"scan_topic": f"/{SECRET}_7/scan"})
     run = Run(Trial("id", "amcl", 0, parameters=parameters), Estimate(track, (told,)))
     redactor = Redactor(bundle)
