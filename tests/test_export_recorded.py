@@ -98,6 +98,8 @@ def test_what_holds_is_carried_into_the_window(sample, tmp_path):
             first.append((message.log_time, channel.topic, decoded))
             topics[channel.topic] = channel.metadata["offered_qos_profiles"]
         assert reader.get_header().profile == "ros2"
+        (bag,) = reader.iter_metadata()
+        assert (bag.name, bag.metadata) == ("rosbag2", {"serialized_metadata": ""})
     start = first[0][0]
     held = {topic for t, topic, _ in first if t == start}
     assert {"/tf_static", "/map", "/tf"} <= held

@@ -52,9 +52,15 @@ def contents(folder):
                 yield repr((summary.schemas, summary.channels)).encode()
                 for _, _, message in reader.iter_messages():
                     yield message.data
+                for attachment in reader.iter_attachments():
+                    yield attachment.name.encode() + attachment.data
+                yield repr(list(reader.iter_metadata())).encode()
 
 
-@pytest.mark.parametrize("to", [("mcap", "--only", "recorded"), ("tum", "--covariance")])
+@pytest.mark.parametrize(
+    "to",
+    [("mcap",), ("tum", "--covariance"), ("csv", "--only", "recorded")],
+)
 def test_nothing_that_identifies_is_left(bundle, tmp_path, to):
     ran = call(bundle.path, "--to", *to, "--redact", "--json", "-o", tmp_path / "out")
     assert ran.exit_code == 0, ran.output
@@ -109,8 +115,8 @@ def test_runs_are_redacted_with_the_bundle(bundle):
         f"{SECRET}_7/map", f"{SECRET}_7/base_link", np.array([1]), np.zeros((1, 3))
     )
     measured = (np.array([1]), np.zeros((1, 2)), np.eye(2)[None], np.array([True]))
-    told = Innovations("scans", *measured,
-                       frame_id=f"{SECRET}_7/map", about=np.array([f"{SECRET}_7/laser"]))  # fmt: skip
+    about = np.array([f"{SECRET}_7/laser"])
+    told = Innovations("scans", *measured, frame_id=f"{SECRET}_7/map", about=about)
     parameters = json.dumps({"scan_topic": f"/{SECRET}_7/scan"})
     run = Run(Trial("id", "amcl", 0, parameters=parameters), Estimate(track, (told,)))
     redactor = Redactor(bundle)

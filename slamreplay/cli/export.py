@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -11,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from slamreplay.cli import options
+from slamreplay.cli.terminal import complain, say_json, say_path
 from slamreplay.export.formats import MARKER, Format, Only, Written, needs
 
 if TYPE_CHECKING:
@@ -27,9 +27,9 @@ To = Annotated[
     Format,
     typer.Option(
         "--to",
-        help="tum: trajectories, of RUNS one file per trial. mcap: the "
+        help="tum: trajectories, of RUNS one file per trial. csv: tables and answers. mcap: the "
         "recorded evidence as a ROS 2 log, and the answers as Foxglove's messages with a layout. "
-        "rerun: an .rrd.",
+        "rerun: an .rrd. rviz: map, overlays and a configuration.",
     ),
 ]
 Output = Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="Folder to write.")]
@@ -47,7 +47,7 @@ End = Annotated[
 ]
 OnlyPart = Annotated[
     Only | None,
-    typer.Option("--only", help="Of mcap one half; recorded evidence alone is fast."),
+    typer.Option("--only", help="Of mcap and csv one half; recorded evidence alone is fast."),
 ]
 Covariance = Annotated[
     bool,
@@ -114,7 +114,15 @@ def export(
         post = _looked_back(bundle, runs) if halves.analysis else None
         with progress_bar("writing") as progress:
             request = Request(
-                bundle, runs, window, post, halves.recorded, covariance, redact, progress
+                bundle,
+                runs,
+                window,
+                post,
+                _report_of(post) if to is Format.MCAP else None,
+                halves.recorded,
+                covariance,
+                redact,
+                progress,
             )
             written = write_export(request, to, output)
     _tell(written, output, as_json=as_json)
@@ -147,12 +155,18 @@ def _looked_back(bundle: Bundle, runs: Sequence[Run]) -> Postmortem:
         return postmortem(bundle, runs, progress=progress)
 
 
+def _report_of(post: Postmortem | None) -> str | None:
+    from slamreplay.report.build import build
+
+    return None if post is None else build(post).json_text()
+
+
 def _tell(written: Written, output: Path, *, as_json: bool) -> None:
     """The files on stdout; on stderr what the format has no place for."""
     for missed in written.not_written:
-        typer.echo(f"not written: {missed.what}: {missed.count}, {missed.reason}", err=True)
+        complain(f"not written: {missed.what}: {missed.count}, {missed.reason}")
     if as_json:
-        typer.echo(json.dumps({"folder": str(output), **written.head}, indent=1))
+        say_json({"folder": str(output), **written.head})
         return
     for name in written.files:
-        typer.echo(str(output / name))
+        say_path(output / name)

@@ -20,8 +20,10 @@ class Format(StrEnum):
     """What can be written."""
 
     TUM = "tum"
+    CSV = "csv"
     MCAP = "mcap"
     RERUN = "rerun"
+    RVIZ = "rviz"
 
 
 class Only(StrEnum):
@@ -41,8 +43,10 @@ class Needs:
 
 _OF_FORMAT = {
     Format.TUM: Needs(recorded=True, analysis=False),
+    Format.CSV: Needs(recorded=True, analysis=True),
     Format.MCAP: Needs(recorded=True, analysis=True),
     Format.RERUN: Needs(recorded=False, analysis=True),
+    Format.RVIZ: Needs(recorded=False, analysis=True),
 }
 
 
@@ -76,7 +80,7 @@ def needs(to: Format, only: Only | None, *, covariance: bool = False) -> Needs:
     """
     both = _OF_FORMAT[to]
     if only is not None and not (both.recorded and both.analysis):
-        raise UsageError(f"--to {to} takes no --only", hint="--to mcap does")
+        raise UsageError(f"--to {to} takes no --only", hint="--to mcap and --to csv do")
     if covariance and to is not Format.TUM:
         raise UsageError(f"--to {to} takes no --covariance", hint="--to tum does")
     if to is Format.RERUN and find_spec("rerun") is None:

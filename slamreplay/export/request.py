@@ -36,6 +36,7 @@ class Request:
         runs: trials on it; empty where a log or a bundle was given.
         window: what is written of it; None is all.
         post: what was found in it; None where only recorded evidence is asked for.
+        report_json: the report of it, for formats that take files along.
         recorded: whether recorded evidence is written, beside what was found.
         covariance: whether trajectories are written with their covariances, too.
         redacted: whether names were replaced.
@@ -46,6 +47,7 @@ class Request:
     runs: Sequence[Run] = ()
     window: Window | None = None
     post: Postmortem | None = None
+    report_json: str | None = None
     recorded: bool = True
     covariance: bool = False
     redacted: bool = False

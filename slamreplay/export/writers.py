@@ -64,6 +64,13 @@ def _tum(request: Request, folder: Path) -> Sequence[NotWritten]:
     return ()
 
 
+def _csv(request: Request, folder: Path) -> Sequence[NotWritten]:
+    from slamreplay.export.spreadsheets.writer import write_csv
+
+    write_csv(request, folder)
+    return ()
+
+
 def _mcap(request: Request, folder: Path) -> Sequence[NotWritten]:
     missed: Sequence[NotWritten] = ()
     if request.recorded:
@@ -71,8 +78,15 @@ def _mcap(request: Request, folder: Path) -> Sequence[NotWritten]:
 
         missed = write_recorded(request, folder)
     if request.post is not None:
-        analysis = import_module("slamreplay.export.foxglove")
-        analysis.write_foxglove(request.post, request.bundle.view(), folder, **_shared(request))
+        from slamreplay.export.foxglove import write_foxglove
+
+        write_foxglove(
+            request.post,
+            request.bundle.view(),
+            folder,
+            report_json=request.report_json,
+            **_shared(request),
+        )
     return missed
 
 
@@ -82,10 +96,19 @@ def _rerun(request: Request, folder: Path) -> Sequence[NotWritten]:
     return ()
 
 
+def _rviz(request: Request, folder: Path) -> Sequence[NotWritten]:
+    from slamreplay.export.rviz.writer import write_rviz
+
+    write_rviz(request, folder)
+    return ()
+
+
 _WRITERS: dict[Format, Writer] = {
     Format.TUM: _tum,
+    Format.CSV: _csv,
     Format.MCAP: _mcap,
     Format.RERUN: _rerun,
+    Format.RVIZ: _rviz,
 }
 
 

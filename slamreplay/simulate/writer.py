@@ -33,6 +33,10 @@ FOLDER_MARKER = "metadata.yaml"
 #: Larger chunks than recorders use: a sample log compresses better so.
 _CHUNK_BYTES = 4 << 20
 _LIBRARY = "slamreplay simulate"
+#: rosbag2 writes policies of its quality of service as numbers up to version 8 of its metadata and
+#: as words since; each release before Jazzy reads numbers only. By a record without a version the
+#: later ones know that it is numbers they find (rosbag2_storage_mcap, mcap_storage.cpp).
+_BAG_METADATA = {"serialized_metadata": ""}
 
 
 def write_log(target: Path, make: Callable[[Messages], Sequence[Record]]) -> None:
@@ -119,6 +123,8 @@ def write_mcap(
     with path.open("wb") as stream:
         writer = Writer(stream, chunk_size=_CHUNK_BYTES, compression=CompressionType.ZSTD)
         writer.start(profile="ros2", library=library)
+        if latched is not None:
+            writer.add_metadata("rosbag2", _BAG_METADATA)
         schemas: dict[str, int] = {}
         channels: dict[str, int] = {}
         for record in log:
