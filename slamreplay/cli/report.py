@@ -186,7 +186,7 @@ def _draw(post: Postmortem, target: Path) -> None:
     from slamreplay.report.figure_files import write_figures
 
     for path in write_figures(post, target):
-        typer.echo(f"figure: {path}", err=True)
+        complain(f"figure: {path}")
 
 
 def _propose(post: Postmortem, target: Path, original: Path | None) -> None:
