@@ -49,6 +49,7 @@ def export(
     from slamreplay.export.formats import MARKER, Only, needs
     from slamreplay.export.writers import Request, redacted, window_of, write_export
     from slamreplay.postmortem import postmortem
+    from slamreplay.report.build import build
 
     form = _format(to)
     halves = needs(form, None if only is None else Only(only), covariance=covariance)
@@ -60,7 +61,17 @@ def export(
         bundle, runs = redacted(bundle, runs)
     with shown(progress) as tell:
         post = postmortem(bundle, runs, progress=tell) if halves.analysis else None
-        request = Request(bundle, runs, window, post, halves.recorded, covariance, redact, tell)
+        request = Request(
+            bundle,
+            runs,
+            window,
+            post,
+            None if post is None else build(post).json_text(),
+            halves.recorded,
+            covariance,
+            redact,
+            tell,
+        )
         written = write_export(request, form, Path(output))
     return [Path(output) / name for name in written.files]
 
