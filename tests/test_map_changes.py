@@ -142,7 +142,7 @@ def test_what_a_mapper_draws_late_or_wrongly_is_no_change():
     laid = BeamsOnMap(*(np.zeros((10, 1), dtype=t) for t in (np.int8, np.int32, bool, np.float32)))
     walls = WorkingMap(~np.zeros((1, 4), bool), fresh, 0.1, np.zeros(2), np.zeros(3))
     no_walls = replace(walls, walls=~walls.walls)
-    over = LaidOver(laid, laid.is_sure, walls, fresh, fresh)
+    over = LaidOver(laid, laid.is_sure, walls, fresh, fresh, laid.is_sure)
     new = Standing(slots, holds, holds, other, none_s, none_s)
     away = Gone(slots, holds, holds, other, none_s, none_s)
 

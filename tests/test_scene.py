@@ -265,7 +265,7 @@ def test_what_passed_by_left_its_place_empty():
 
 
 def test_classes_in_the_order_of_what_is_known():
-    """Of one scan: met, near a wall, moving twice, moving alone, new, gone, silent, invalid."""
+    """Of one scan: met, at a wall, moving twice, moving alone, new, gone, silent, invalid."""
     says = np.array([[MET, NEARER, NEARER, NEARER, BEYOND, NEARER, NEARER, BEYOND, SILENT, MET]])
     n = says.shape[1]
     laid = BeamsOnMap(says, says, says > 0, says)
@@ -274,13 +274,13 @@ def test_classes_in_the_order_of_what_is_known():
     kind = np.full((1, n), HIT, dtype=np.int8)
     kind[0, -1] = INVALID
     flags = np.zeros((4, 1, n), dtype=bool)
-    near, is_new, is_gone, may_pass = flags
-    near[0, 1] = is_new[0, 6] = is_gone[0, 7] = may_pass[0, [2, 3, 5]] = True
+    at_wall, is_new, is_gone, may_pass = flags
+    at_wall[0, [1, 6, 7]] = is_new[0, 6] = is_gone[0, 7] = may_pass[0, [2, 3, 5]] = True
 
     met = what_was_met(
         Beams(np.zeros(1, np.int64), ends, kind, np.zeros(2)),
         laid,
-        near,
+        at_wall,
         (is_new, is_gone),
         may_pass,
     )
@@ -289,6 +289,18 @@ def test_classes_in_the_order_of_what_is_known():
         "MAPPED", "MAPPED", "MOVING", "MOVING", "OTHER", "OTHER", "APPEARED", "REMOVED", "OTHER",
         "INVALID",
     ]  # fmt: skip
+
+
+def test_wall_that_is_seen_over_unmapped_ground_is_mapped():
+    cells = room_grid().cells.copy()
+    cells[3:177, 3:237][cells[3:177, 3:237] == 0] = -1  # nothing but a seam along the walls
+    grid = OccupancyGrid(cells, 0.05, room_grid().origin_xyyaw)
+    found = hindsight(rebuilt(synthetic_bundle(seconds=4.0), {}, grid).view())
+    (one,) = found.changes.met
+
+    assert found.coverage == 1.0
+    assert not found.changes.changed_share.any()
+    assert np.mean(one.met[one.met != Met.INVALID] == Met.MAPPED) > 0.98
 
 
 def test_each_floor_has_its_beams_classed_in_its_own_map():

@@ -12,8 +12,11 @@ from numpy.typing import NDArray
 class Met(IntEnum):
     """What a beam met, cast from where hindsight says the robot was.
 
-    MOVING ended on something unmapped that did not stay; OTHER says nothing of the map: it met
-    unmapped cells first, or nobody knows where the robot was, or one beam alone decides nothing.
+    MAPPED ended at a mapped wall; APPEARED on what stands where the map of that time shows nothing;
+    REMOVED went through a mapped wall that is gone, wherever it ended; MOVING ended on something
+    unmapped that did not stay. APPEARED and REMOVED are the changed beams that the verdict counts.
+    OTHER says nothing: it returned from unmapped ground or not at all, or nobody knows where the
+    robot was, or one beam alone decides nothing.
     """
 
     INVALID = 0

@@ -75,6 +75,33 @@ def on_map(working: WorkingMap, beams: Beams, poses: se2.Array) -> BeamsOnMap:
     return BeamsOnMap(says, where, is_sure, wall_m)
 
 
+def ends_in(
+    mask: NDArray[np.bool_], working: WorkingMap, beams: Beams, poses: se2.Array
+) -> NDArray[np.bool_]:
+    """(N, B) hits that end in cells of a mask (H, W) of a working map, from poses (N, 3)."""
+    out = np.zeros(beams.kind.shape, dtype=bool)
+    corner, cell_m = working.corner_xy, working.resolution_m
+    _ends_in(mask, corner, cell_m, beams.ends, beams.kind, np.ascontiguousarray(poses), out)
+    return out
+
+
+@njit(cache=True)
+def _ends_in(mask, corner, cell_m, ends, kind, poses, out):  # type: ignore[no-untyped-def]
+    for s in range(kind.shape[0]):
+        if not np.isfinite(poses[s, 0]):
+            continue
+        cos, sin = np.cos(poses[s, 2]), np.sin(poses[s, 2])
+        for b in range(kind.shape[1]):
+            if kind[s, b] != HIT:
+                continue
+            x = poses[s, 0] + cos * ends[s, b, 0] - sin * ends[s, b, 1]
+            y = poses[s, 1] + sin * ends[s, b, 0] + cos * ends[s, b, 1]
+            col = int(np.floor((x - corner[0]) / cell_m))
+            row = int(np.floor((y - corner[1]) / cell_m))
+            if 0 <= row < mask.shape[0] and 0 <= col < mask.shape[1]:
+                out[s, b] = mask[row, col]
+
+
 @njit(cache=True, nogil=True)
 def _lay_over(  # type: ignore[no-untyped-def]  # noqa: C901
     cells, cell, corner, ends, kind, laser, poses, beyond, out

@@ -104,7 +104,7 @@ def _look(
     is_new = _at(where, laid, NEARER, new.slots, new.holds)
     is_gone = _at(where, laid, BEYOND, away.slots, away.holds)
     may_pass = passing(where, beams, poses, solid, stood, passed)
-    met = what_was_met(beams, laid, over.near, (is_new, is_gone), may_pass)
+    met = what_was_met(beams, laid, over.at_wall, (is_new, is_gone), may_pass)
 
     valid = np.count_nonzero(beams.kind != INVALID, axis=1).astype(np.float64)
     valid[(valid == 0) | ~np.isfinite(poses).all(axis=1)] = np.nan

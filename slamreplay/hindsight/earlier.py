@@ -17,7 +17,7 @@ from scipy.ndimage import distance_transform_edt
 from slamreplay.bundle.view import BundleView
 from slamreplay.geometry import se2
 from slamreplay.hindsight.beams import Beams
-from slamreplay.hindsight.changed_beams import BEYOND_M, NEARER, BeamsOnMap, on_map
+from slamreplay.hindsight.changed_beams import BEYOND_M, NEARER, BeamsOnMap, ends_in, on_map
 from slamreplay.maps.grid import OCCUPIED_FROM, OccupancyGrid
 from slamreplay.matching.field import WorkingMap
 
@@ -108,6 +108,7 @@ class LaidOver:
         drawn: the newest map with the walls of every version.
         own_free: (H, W) cells that were called free, if at all, by the log's own mapper.
         own_wall: (H, W) cells that were called a wall, if at all, by the log's own mapper.
+        at_wall: (N, B) hits that end at a mapped wall, whatever they passed before.
     """
 
     beams: BeamsOnMap
@@ -115,6 +116,7 @@ class LaidOver:
     drawn: WorkingMap
     own_free: NDArray[np.bool_]
     own_wall: NDArray[np.bool_]
+    at_wall: NDArray[np.bool_]
 
 
 def laid_over(
@@ -129,7 +131,8 @@ def laid_over(
         poses: (N, 3) of the base in the grid's frame; NaN rows stay silent.
     """
     laid = on_map(working, beams, poses)
-    near, walls = _near_a_wall(working, laid), working.walls
+    about, walls = near_walls(working), working.walls
+    near, at_wall = _near_a_wall(about, laid), ends_in(about, working, beams, poses)
     own_free = own_wall = np.zeros_like(walls)
     for version in earlier:
         rows = version.rows(beams.t_ns)
@@ -137,8 +140,10 @@ def laid_over(
         if grid is None:
             continue
         old = on_raster(grid, working)
-        part = on_map(old, beams.take(rows), poses[rows])
-        near[rows] = _near_a_wall(old, part)
+        of_old, about = beams.take(rows), near_walls(old)
+        part = on_map(old, of_old, poses[rows])
+        near[rows] = _near_a_wall(about, part)
+        at_wall[rows] = ends_in(about, old, of_old, poses[rows])
         laid.says[rows], laid.where[rows] = part.says, part.where
         laid.is_sure[rows], laid.wall_m[rows] = part.is_sure, part.wall_m
         walls = walls | old.walls
@@ -146,11 +151,10 @@ def laid_over(
             own_free, own_wall = old.unknown | old.walls, ~old.walls
         elif version.is_first:
             own_free = own_wall = old.unknown
-    return LaidOver(laid, near, replace(working, walls=walls), own_free, own_wall)
+    return LaidOver(laid, near, replace(working, walls=walls), own_free, own_wall, at_wall)
 
 
-def _near_a_wall(working: WorkingMap, laid: BeamsOnMap) -> NDArray[np.bool_]:
-    near = near_walls(working)
+def _near_a_wall(near: NDArray[np.bool_], laid: BeamsOnMap) -> NDArray[np.bool_]:
     return (laid.says == NEARER) & near.ravel()[laid.where]
 
 

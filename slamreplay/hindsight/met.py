@@ -24,7 +24,7 @@ _TWICE = 2
 def what_was_met(
     beams: Beams,
     laid: BeamsOnMap,
-    near: NDArray[np.bool_],
+    at_wall: NDArray[np.bool_],
     changed: tuple[NDArray[np.bool_], NDArray[np.bool_]],
     may_pass: NDArray[np.bool_],
 ) -> NDArray[np.uint8]:
@@ -33,14 +33,15 @@ def what_was_met(
     Args:
         beams: the scans.
         laid: the beams against the map of their time; what says nothing of it is silent.
-        near: (N, B) beams that ended before their wall, but so near to another that they met it.
+        at_wall: (N, B) hits that ended at a mapped wall, also if they say nothing of it: past an
+            edge, or over unmapped cells.
         changed: (N, B) each: beams that ended on what stands where the map shows nothing, and
             those that went through a mapped wall that is gone.
         may_pass: (N, B) beams that ended where something did not stay.
     """
     is_new, is_gone = changed
     met = np.full(beams.kind.shape, Met.OTHER, dtype=np.uint8)
-    met[(laid.says == MET) | near] = Met.MAPPED
+    met[(laid.says == MET) | at_wall] = Met.MAPPED
     met[may_pass & has_neighbour(beams, laid.says == NEARER)] = Met.MOVING
     met[is_new], met[is_gone] = Met.APPEARED, Met.REMOVED
     met[beams.kind == INVALID] = Met.INVALID
