@@ -231,7 +231,9 @@ def test_scans_keep_their_budget(budget):
     assert len(packed({}, {"ends": one.ends, "met": one.met})) <= budget * 1.05 + 200
     assert told.is_thinned
     assert (len(one.rows), one.met.shape[1]) == (told.scans, told.beams)
-    np.testing.assert_array_equal(one.rows, np.arange(0, 400, told.every_scan))
+    steps = np.diff(one.rows)
+    assert (one.rows[0], one.rows[-1]) == (0, 399)
+    assert steps.max() - steps.min() <= 1
     assert told.beams == -(-900 // told.every_beam)
 
 
