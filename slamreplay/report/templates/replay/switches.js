@@ -10,10 +10,9 @@ function measure(on) {
 }
 
 function followRobot(on) {
-  const { view, scene } = player;
+  const { view } = player;
   player.following = on;
   if (on) { view.fitted = false; view.scale = Math.max(view.scale, ROBOT_SCALE); }
-  if (!on && !scene.head.window) return;
   find("follow").setAttribute("aria-pressed", String(on));
   redraw(true);
 }
