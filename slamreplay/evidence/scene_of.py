@@ -18,7 +18,7 @@ from slamreplay.verdict.clearance import inscribed_radius_m
 _CORNERS = 24
 
 
-def scene_of(post: Postmortem, view: BundleView, *, most_scans: int | None = 1200) -> Scene:
+def scene_of(post: Postmortem, view: BundleView, *, most_scans: int | None = 2400) -> Scene:
     """What there was to see at each moment of a log.
 
     Args:

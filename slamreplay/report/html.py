@@ -22,18 +22,12 @@ from slamreplay.report.replay.replay import replay_of
 from slamreplay.report.sections import sections
 
 #: Files of the templates' folder that go into the page as they are.
-_STYLES = ("report.css", "replay.css")
-#: One idea each; together they are one module, in this order.
-_SCRIPTS = (
-    "replay_data.js",
-    "replay_words.js",
-    "replay_ink.js",
-    "replay_view.js",
-    "replay_map.js",
-    "replay_lanes.js",
-    "replay_pointer.js",
-    "replay_control.js",
-)
+_STYLES = ("report.css", "replay/replay.css")
+#: The replay, one idea each; together they are one module, in this order.
+_SCRIPTS = tuple(f"replay/{name}.js" for name in (
+    "data", "words", "ink", "view", "ground", "paths", "scans", "robots", "map", "bands", "plots",
+    "lanes", "player", "pointer", "links", "switches", "keys", "start",
+))  # fmt: skip
 
 
 @dataclass(frozen=True)

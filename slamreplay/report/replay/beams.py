@@ -1,4 +1,4 @@
-"""Scans thinned to a budget of bytes: every n-th scan, every m-th beam, ends at 1 cm."""
+"""Scans thinned to a budget of bytes: fewer scans, every n-th beam, ends at 1 cm."""
 
 from __future__ import annotations
 
@@ -16,17 +16,16 @@ END_M = 0.01
 REMOVED_UNSEEN = 6
 #: More beams in one scan than this look alike; fewer scans a second than this no longer flow.
 _ENOUGH_BEAMS, _ENOUGH_HZ = 400, 2.0
-#: A scan in so many is packed to learn what one takes.
-_SAMPLE = 24
+#: So many scans are packed to learn what one takes.
+_SAMPLE = 48
 
 
 @dataclass(frozen=True)
 class Thinning:
-    """What stayed of a laser's scans: every so-manieth scan and beam."""
+    """What stayed of a laser's scans and beams."""
 
     scans: int
     of_scans: int
-    every_scan: int
     beams: int
     of_beams: int
     every_beam: int
@@ -34,7 +33,7 @@ class Thinning:
     @property
     def is_thinned(self) -> bool:
         """Whether anything was left out."""
-        return self.every_scan > 1 or self.every_beam > 1
+        return self.scans < self.of_scans or self.every_beam > 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,9 +55,10 @@ class PackedScans:
 
 
 def packed_scans(scans: SceneScans, usable: NDArray[np.bool_], budget: int) -> PackedScans | None:
-    """As many scans as the budget holds, evenly; None where there is none to draw.
+    """As many scans as the budget holds, evenly in their order; None where there is none to draw.
 
-    Beams go first where a scan has more than 400; then scans, down to two a second; then both.
+    Beams go first where a scan has more than 400; then scans, down to two a second; then beams
+    again, down to 100.
 
     Args:
         scans: of one laser.
@@ -71,22 +71,29 @@ def packed_scans(scans: SceneScans, usable: NDArray[np.bool_], budget: int) -> P
     span_s = max(float(scans.t_ns[rows[-1]] - scans.t_ns[rows[0]]) / 1e9, 1.0)
     every_beam = max(1, -(-width // _ENOUGH_BEAMS))
     while True:
-        sample = rows[:: max(1, len(rows) // _SAMPLE)]
+        sample = _evenly(rows, _SAMPLE)
         taken = _size(*_drawn(scans, sample, every_beam)) / len(sample)
-        fit = max(1, int(budget / max(taken, 1e-9)))
-        every_scan = -(-len(rows) // fit)
-        flows = len(rows) / every_scan >= min(_ENOUGH_HZ * span_s, float(len(rows)))
+        fit = min(max(int(budget / max(taken, 1e-9)), 1), len(rows))
+        flows = fit >= min(_ENOUGH_HZ * span_s, float(len(rows)))
         if flows or width / every_beam <= _ENOUGH_BEAMS / 4:
             break
         every_beam *= 2
     while True:
-        kept = rows[::every_scan]
+        kept = _evenly(rows, fit)
         ends, met = _drawn(scans, kept, every_beam)
-        if _size(ends, met) <= budget or len(kept) == 1:
+        over = _size(ends, met) / max(budget, 1)
+        if over <= 1.0 or fit == 1:
             break
-        every_scan += 1
-    told = Thinning(len(kept), len(rows), every_scan, met.shape[1], width, every_beam)
+        fit = max(int(fit / max(over, 1.02)), 1)
+    told = Thinning(len(kept), len(rows), met.shape[1], width, every_beam)
     return PackedScans(kept, ends, met, told)
+
+
+def _evenly(rows: NDArray[np.int64], count: int) -> NDArray[np.int64]:
+    """So many of the rows, the first and the last among them."""
+    if count >= len(rows):
+        return rows
+    return rows[np.round(np.linspace(0, len(rows) - 1, count)).astype(np.int64)]
 
 
 def _size(ends: NDArray[np.int16], met: NDArray[np.uint8]) -> int:

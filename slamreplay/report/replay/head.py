@@ -62,7 +62,7 @@ def head_of(
             for one in scene.lanes
         ],
         "window": _window(tracks, regions, ground),
-        **_beginning(post, tracks),
+        "open_s": _opens(post, tracks),
     }
 
 
@@ -151,19 +151,19 @@ def _window(
     return _rounded(np.concatenate([low, high]))
 
 
-def _beginning(post: Postmortem, tracks: Mapping[str, PoseTrack]) -> dict[str, object]:
-    """When the belief was most wrong, and when the replay opens: there, or at the first change."""
-    worst, error = None, post.error
+def _opens(post: Postmortem, tracks: Mapping[str, PoseTrack]) -> float:
+    """When the replay opens: the belief most wrong while lost, the first change, or the start."""
+    since, error = post.drawn_from_ns, post.error
     if error is not None:
-        shown = np.where(error.t_ns >= post.drawn_from_ns, error.distance_m, np.nan)
+        lost = np.zeros(len(error.t_ns), dtype=bool)
+        for i in post.judgement.intervals:  # elsewhere nobody vouches for the distance
+            if i.is_lost:
+                lost |= (error.t_ns >= max(i.start_ns, since)) & (error.t_ns < i.end_ns)
+        shown = np.where(lost, error.distance_m, np.nan)
         if np.isfinite(shown).any():
-            row = int(np.nanargmax(shown))
-            worst = [_seconds(post, int(error.t_ns[row])), round(float(shown[row]), 3)]
-    changed = [i.start_ns for i in post.judgement.intervals if i.is_changed]
-    first = next(iter(tracks.values()), None)
-    opens = 0.0 if first is None else _seconds(post, int(first.t_ns[first.has_pose][0]))
-    if worst is not None and worst[1] > post.limits.position_m:
-        opens = worst[0]
-    elif changed:
-        opens = _seconds(post, max(changed[0], post.drawn_from_ns))
-    return {"worst": worst, "open_s": max(opens, 0.0)}
+            return _seconds(post, int(error.t_ns[np.nanargmax(shown)]))
+    for i in post.judgement.intervals:
+        if i.is_changed and i.end_ns > since:
+            return _seconds(post, max(i.start_ns, since))
+    first = [int(track.t_ns[track.has_pose][0]) for track in tracks.values()]
+    return max(_seconds(post, min(first)), 0.0) if first else 0.0

@@ -1,4 +1,4 @@
-"""Arrays and a head of plain values as one text: what `replay_data.js` reads in the browser.
+"""Arrays and a head of plain values as one text: what `data.js` reads in the browser.
 
 A payload is a little-endian uint32, the length of the head; the head as UTF-8 JSON; and the arrays
 one after the other. Integers of several bytes are kept as steps from the value before, and every

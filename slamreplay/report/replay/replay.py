@@ -36,12 +36,14 @@ class Replay:
 
     Attributes:
         payload: base64 of what `packing` describes.
+        lead: what is to be seen, in a sentence.
         notes: what is shown and what was left out, in sentences.
         rows: so many rows of the timeline, and so many lanes: the page keeps room for them.
         shape: of the map: wide, tall, plain or none.
     """
 
     payload: str
+    lead: str
     notes: tuple[str, ...]
     rows: int
     lanes: int
@@ -94,6 +96,7 @@ def replay_of(post: Postmortem, budget: int = BUDGET_BYTES) -> Replay | None:
     notes = words.notes(post, scans=[one for _, one in scans], overlays=overlays, ground=ground)
     return Replay(
         as_text(packed(told, arrays)),
+        words.lead(tracks),
         (*notes, *words.rows_left_out(every)),
         len({mark.kind for mark in scene.marks}),
         len(scene.lanes),

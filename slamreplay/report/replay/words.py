@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 
 from slamreplay.evidence.result import Postmortem
 from slamreplay.geometry.times import NS_PER_S
@@ -20,6 +20,22 @@ def notes(
 ) -> tuple[str, ...]:
     """One sentence for each thing that a reader would otherwise take for the whole."""
     return (*_places(post), *_scans(post, scans), *_overlays(overlays), *_ground(ground))
+
+
+def lead(tracks: Collection[str]) -> str:
+    """What is to be seen, in one sentence, by the paths that are known."""
+    if "odometry" in tracks:
+        return "The path by odometry alone, and each scan laid where that leads."
+    if len(tracks) == 2:
+        return (
+            "Each moment twice: dashed, where the robot believed to be, and solid, where it really "
+            "was, with the scan laid at both. A scan that fits the walls is in its place."
+        )
+    if "belief" in tracks:
+        return "Each moment as the robot believed it; where it really was is not known."
+    if "hindsight" in tracks:
+        return "Each moment as it was; what the robot believed was not recorded."
+    return "The course of the log; no path through the map is known."
 
 
 def rows_left_out(every: Mapping[str, int]) -> tuple[str, ...]:

@@ -21,7 +21,7 @@ function listenToMap(player, redraw) {
       const others = [...fingers].filter(([id]) => id !== event.pointerId).map(([, place]) => place);
       if (others.length) pinch(before, now, others[0]);
       else if (travelled + Math.hypot(now[0] - before[0], now[1] - before[1]) > CLICK_PX) {
-        player.following = false;
+        if (player.following) followRobot(false);
         pan(view, now[0] - before[0], now[1] - before[1]);
       }
       travelled += Math.hypot(now[0] - before[0], now[1] - before[1]);
@@ -68,26 +68,38 @@ function listenToLanes(player, seek, redraw) {
   const { lanes, tip } = player;
   const at = (event) => { const box = lanes.getBoundingClientRect(); return [event.clientX - box.left, event.clientY - box.top]; };
   const end = () => player.scene.head.end_s || 1;
-  let dragging = false;
+  let [dragging, pressed] = [false, null];
   lanes.addEventListener("pointerdown", (event) => {
     if (event.button > 0) return;
     lanes.setPointerCapture(event.pointerId);
+    pressed = at(event);
+    if (event.pointerType === "touch") return; // a finger may be about to scroll the page
     dragging = true;
-    seek(nearMark(player, ...at(event)));
+    seek(nearMark(player, ...pressed));
   });
   lanes.addEventListener("pointermove", (event) => {
     const [x, y] = at(event);
+    if (pressed && Math.abs(x - pressed[0]) > CLICK_PX) dragging = true;
     if (dragging) seek(xToTime(player.course.layout, end(), x));
     player.hovered = dragging || event.pointerType === "touch" ? null : xToTime(player.course.layout, end(), x);
     tip.textContent = lanesTip(player, x, y);
-    tip.hidden = dragging;
+    tip.hidden = dragging || event.pointerType === "touch";
     const room = lanes.clientWidth - tip.offsetWidth - 4;
     tip.style.left = `${Math.max(Math.min(x + 14, room), 0)}px`;
     tip.style.top = `${y + 18}px`;
     redraw();
   });
-  const lift = () => { dragging = false; tip.hidden = true; player.hovered = null; redraw(); };
-  for (const kind of ["pointerup", "pointercancel", "pointerleave"]) lanes.addEventListener(kind, lift);
+  lanes.addEventListener("pointerup", (event) => {
+    if (pressed && !dragging) seek(nearMark(player, ...pressed));
+    lift(event);
+  });
+  const lift = () => {
+    [dragging, pressed] = [false, null];
+    tip.hidden = true;
+    player.hovered = null;
+    redraw();
+  };
+  for (const kind of ["pointercancel", "pointerleave"]) lanes.addEventListener(kind, lift);
 }
 
 // A click on a mark goes to its moment, not to the pixel beside it.

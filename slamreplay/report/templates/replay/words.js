@@ -5,6 +5,8 @@ const MARK_NAMES = {
   jump: "jumps", start: "initial poses", finding: "findings",
 };
 
+const UNDECIDED = ["insufficient_data", "unobservable"];
+
 function digits(value) {
   if (value === null || !Number.isFinite(value)) return "-";
   const size = Math.abs(value);
@@ -32,9 +34,13 @@ function momentText(scene, t) {
   const known = {};
   for (const lane of scene.lanes) known[lane.key] = laneAt(lane, t);
   const parts = [];
+  const state = stateAt(scene, t);
   if (known.error_m != null) {
     const turn = known.error_deg == null ? "" : ` and ${known.error_deg.toFixed(0)} deg`;
-    parts.push(`belief off by ${known.error_m.toFixed(2)} m${turn}`);
+    const apart = `${known.error_m.toFixed(2)} m${turn}`;
+    // Where nothing was decided, hindsight is no better a witness than the belief.
+    const open = state && UNDECIDED.includes(state[0]);
+    parts.push(open ? `belief and hindsight ${apart} apart, and neither is vouched for` : `belief off by ${apart}`);
   } else if (scene.tracks.belief && !poseAt(scene.tracks.hindsight, t)) {
     parts.push("where it really was is not known");
   } else if (scene.tracks.hindsight && !poseAt(scene.tracks.belief, t)) {
@@ -45,7 +51,6 @@ function momentText(scene, t) {
   if (known.changed_share != null) {
     parts.push(`${(100 * known.changed_share).toFixed(0)} % of beams contradict the map`);
   }
-  const state = stateAt(scene, t);
   if (state) parts.push(state[1].toLowerCase());
   // Stretches are told by the state already.
   const named = marksNear(scene, t, 0.06).filter((mark) => !["lost", "map_changed"].includes(mark.kind));

@@ -1,4 +1,4 @@
-// What the page carries, unpacked and asked by time. The layout is told in replay/packing.py.
+// What the page carries, unpacked and asked by time. The layout is told in slamreplay/report/replay/packing.py.
 
 const ARRAY_TYPES = { uint8: Uint8Array, int16: Int16Array, int32: Int32Array, float32: Float32Array };
 const HELD_S = 1.0; // a value this old still stands for the moment
