@@ -15,6 +15,7 @@ from slamreplay.report.figures.canvas import (
     FAINT,
     INK,
     VERMILLION,
+    dress,
     new_figure,
     plain_style,
     svg_bytes,
@@ -75,7 +76,7 @@ def drawn():
     axes.imshow(image, interpolation="nearest", extent=(0.0, 3.0, 0.0, 2.0))
     axes.plot([0.0, 1.0, 3.0], [0.1, 1.9, 0.0], color=BLUE, label="path")
     axes.plot([0.0, 3.0], [0.5, 1.5], color=VERMILLION)
-    axes.set_xlabel(HOSTILE, color=INK)
+    dress(axes, HOSTILE, "y in " + 200 * "long" + " [m]", 9.0)
     axes.tick_params(colors=FAINT)
     return figure
 
@@ -117,7 +118,11 @@ def test_a_file_for_a_paper_has_one_set_of_colours_and_no_style_that_a_policy_co
     assert root.find(f".//{SVG}style") is None
     assert len(pictures(root)) == 1
     assert not any("style" in element.attrib for element in root.iter())
-    assert HOSTILE in [element.text for element in root.iter(f"{SVG}text")]
+    texts = [element.text for element in root.iter(f"{SVG}text")]
+    assert HOSTILE in texts
+    (long,) = (text for text in texts if text.startswith("y in longlong"))
+    assert long.endswith("...ng [m]")
+    assert len(long) == 40
 
 
 def test_dark_greys_keep_their_order_and_their_distance_from_the_paper():

@@ -41,7 +41,7 @@ def sections(page: Page, pictures: Mapping[str, object]) -> tuple[Section, ...]:
         (True, Section("findings", "Findings", "Findings", found)),
         (page.jumps.rows or page.trace_note,
          Section("jumps", "Which measurement moved the belief", "Jumps", len(page.jumps.rows))),
-        (page.usages.rows, Section("pose-age", "How old was the pose?", "Pose age")),
+        (page.usages.rows, Section("pose-age", "How old was the pose?", "Age")),
         (True, Section("covariance", "Is the covariance honest?", "Covariance")),
         (page.means.rows, Section("consistency", "Consistency", "Consistency")),
         (page.design.rows,
@@ -51,7 +51,7 @@ def sections(page: Page, pictures: Mapping[str, object]) -> tuple[Section, ...]:
          Section("confidence", "What the confidence means", "Confidence")),
         (page.streams.rows, Section("audit", "Clocks and transforms", "Clocks, tf")),
         (page.missing or page.unasked or page.lacking,
-         Section("lacking", "What cannot be judged", "Not judged")),
+         Section("lacking", "What cannot be judged", "Lacking")),
         (True, Section("basis", "What this rests on", "Sources")),
         (True, Section("ticket", "For a ticket", "Ticket")),
     )  # fmt: skip

@@ -83,10 +83,17 @@ def text_size(width_in: float) -> float:
     return 8.0 if width_in < 7.3 else 9.5
 
 
+def plain(text: str, most: int = 40) -> str:
+    """Text that may hold a log's names: none of it is a formula, and its middle is left out."""
+    if len(text) > most:
+        text = f"{text[: most - 9]}...{text[-6:]}"
+    return text.replace("$", r"\$")
+
+
 def dress(axes: Axes, x: str, y: str, size: float) -> None:
     """Labels with units, quiet ticks, no box."""
-    axes.set_xlabel(x, fontsize=size, color=INK)
-    axes.set_ylabel(y, fontsize=size, color=INK)
+    axes.set_xlabel(plain(x), fontsize=size, color=INK)
+    axes.set_ylabel(plain(y), fontsize=size, color=INK)
     axes.tick_params(labelsize=size - 0.5, colors=FAINT, length=3, width=0.6)
     for side in ("top", "right"):
         axes.spines[side].set_visible(False)
