@@ -13,6 +13,7 @@ from slamreplay.geometry.times import NS_PER_S
 from slamreplay.report.designs import design_of
 from slamreplay.report.dose_tables import level_text, panel_of
 from slamreplay.report.figures.doses import response_label
+from slamreplay.report.figures.map import NAMED
 from slamreplay.report.phrases import graph_alt, map_note, percent, reference_note, seconds, short
 
 #: So many curves of a design are told in numbers; the report has them all.
@@ -42,11 +43,13 @@ def map_caption(post: Postmortem) -> str:
             "Path that the robot believed (dashed) and path rebuilt in hindsight (solid), "
             f"{error.distance_m[worst]:.2f} m apart at worst, at {at_s:.1f} s."
         )
+    told.append(_offset(post))
     changes = None if hindsight is None else hindsight.changes
     if changes is not None and changes.regions:
         count, area = len(changes.regions), sum(region.area_m2 for region in changes.regions)
         many = "1 changed region" if count == 1 else f"{count} changed regions"
-        told.append(f"{many} (R1 up), {area:.1f} m² in all.")
+        named = "R1" if count == 1 else f"R1 to R{min(count, NAMED)} by size"
+        told.append(f"{many} ({named}), {area:.1f} m² in all.")
     if post.judgement.stops:
         told.append("Numbers mark unplanned stops.")
     return " ".join([*told, map_note(post), _verdict(post), _hindsight(post)])
@@ -63,6 +66,7 @@ def course_caption(post: Postmortem) -> str:
             f"{limits.position_m:g} m or {np.degrees(limits.yaw_rad):.0f} deg for "
             f"{limits.lost_s:g} s (dashed) the robot counts as lost, here for {lost_s:.1f} s."
         )
+        told.append(_offset(post))
     if post.hindsight is not None and post.hindsight.changes is not None:
         changed_s = sum(i.duration_ns for i in intervals if i.is_changed) / NS_PER_S
         told.append(
@@ -161,6 +165,12 @@ def _verdict(post: Postmortem) -> str:
     judgement = post.judgement
     sure = "" if judgement.confidence is None else f", confidence {percent(judgement.confidence)}"
     return f"Verdict: {STATES[judgement.state].name.lower()}{sure}."
+
+
+def _offset(post: Postmortem) -> str:
+    if post.frame_offset is None or post.error is None:
+        return ""
+    return "The constant offset between the robot's map frame and this one is taken out of errors."
 
 
 def _hindsight(post: Postmortem) -> str:

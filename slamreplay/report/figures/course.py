@@ -34,7 +34,7 @@ def course_figure(post: Postmortem, width_in: float) -> Figure | None:
     if not parts:
         return None
     size = canvas.text_size(width_in)
-    row_in = 1.75 if width_in > canvas.COLUMN else 1.2  # a column of a paper is short, too
+    row_in = 1.75 if width_in > canvas.COLUMN else 1.3  # a column of a paper is short, too
     figure = canvas.new_figure(width_in, row_in * len(parts) + 0.9)
     every = figure.subplots(len(parts), 1, sharex=True, squeeze=False)[:, 0]
     handles = canvas.draw_parts(parts, every, size)
@@ -59,6 +59,7 @@ def _draw(
     end_s = float(post.seconds(np.int64(post.manifest.end_ns)))
     canvas.dress(axes, "time since start [s]", curve(axes, post), size)
     axes.set_xlim(0.0, max(end_s, 1e-3))
+    axes.locator_params(axis="x", nbins=6)  # times of long logs have many digits
     _bands(axes, post)
     if curve is _distance or post.error is None:
         _name_bands(axes, post, size - 1.5)

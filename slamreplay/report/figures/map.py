@@ -32,7 +32,7 @@ from slamreplay.report.figures.fitted import fit_plane
 
 _MARGIN_M = 2.5
 #: So many regions, the largest, bear their number; the others' would hide the map.
-_NAMED = 6
+NAMED = 6
 
 
 def map_figure(post: Postmortem, width_in: float) -> Figure | None:
@@ -295,7 +295,7 @@ def _draw_regions(axes: Axes, post: Postmortem, size: float) -> None:
                 arrowprops={"arrowstyle": "->", "color": INK, "linewidth": 1.0},
                 zorder=5,
             )
-        if number <= _NAMED:
+        if number <= NAMED:
             axes.annotate(
                 f"R{number}",
                 (x1 + 0.1, y1 + 0.1),

@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 
 from slamreplay import __version__
 from slamreplay.report.figures.canvas import FAINT, few_colours, pixels, svg_bytes
+from slamreplay.report.phrases import bound
 
 if TYPE_CHECKING:
     import PIL.Image
@@ -33,7 +34,7 @@ def captioned_png(figure: Figure, title: str, caption: str, dpi: int = DPI) -> b
     from PIL import Image, PngImagePlugin
 
     above = pixels(figure, dpi)
-    below = _written(caption, float(figure.get_size_inches()[0]), dpi)
+    below = _written(bound(caption), float(figure.get_size_inches()[0]), dpi)
     whole = Image.new("RGB", (above.width, above.height + below.height), "white")
     whole.paste(above, (0, 0))
     whole.paste(below, (0, above.height))
@@ -75,7 +76,7 @@ def wrapped(text: str, width_in: float, length_in: Any) -> list[str]:
     """Lines no longer than the paper, by `length_in(line)`; a word that is longer is cut."""
     lines: list[str] = []
     line = ""
-    for word in text.split():
+    for word in text.split(" "):
         rest = word
         while rest:
             longer = f"{line} {rest}" if line else rest
