@@ -14,6 +14,8 @@ ORANGE, VERMILLION, PURPLE, GREY = "#E69F00", "#D55E00", "#CC79A7", "#9AA0A6"
 
 #: Where the robot believed to be and where hindsight says it was, on a dark ground.
 BELIEF, HINDSIGHT = VERMILLION, SKY
+#: Replayed estimators, one after the other.
+RUNS = (PURPLE, GREEN, YELLOW, BLUE, GREY)
 
 #: A map on a dark ground, where yellow and blue can both be seen.
 GROUND, FREE, WALL = "#16191d", "#2d333a", "#c3cad1"

@@ -21,7 +21,6 @@ from slamreplay.export.shown import BASE_BELIEVED, BASE_HINDSIGHT, Shown
 
 #: Rows whose ellipses are worked out at a time.
 _ROWS = 4096
-_RUNS = (colours.PURPLE, colours.GREEN, colours.YELLOW, colours.BLUE, colours.GREY)
 
 
 def robots(shown: Shown) -> Iterator[Stream]:
@@ -41,7 +40,7 @@ def robots(shown: Shown) -> Iterator[Stream]:
         topic = topics.run(name)
         frame = shown.redact(track.frame_id)
         yield _poses(topic, frame, track)
-        yield _path(topic, frame, track, _RUNS[number % len(_RUNS)], shown.start_ns)
+        yield _path(topic, frame, track, colours.RUNS[number % len(colours.RUNS)], shown.start_ns)
 
 
 def _poses(topic: str, frame: str, track: PoseTrack) -> Stream:

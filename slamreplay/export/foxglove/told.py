@@ -16,6 +16,7 @@ from slamreplay.export.foxglove.own import message_type
 from slamreplay.export.foxglove.parts import Stream, stamp
 from slamreplay.export.notes import notes, verdict_facts
 from slamreplay.export.shown import Shown
+from slamreplay.geometry.times import NS_PER_S
 from slamreplay.verdict.judgement import Interval
 
 _LEVEL: dict[Severity, Log.Level.ValueType] = {
@@ -63,9 +64,13 @@ def _notes(shown: Shown) -> Stream:
 
 
 def _states(shown: Shown) -> Stream:
-    """Each state at its start, and the last once more at its end: a plot needs to know where."""
+    """Each state at its start and every second on, the last one at its end, too.
+
+    A plot knows only of the part of a file that its viewer has read.
+    """
     for state in shown.states:
-        yield state.start_ns, topics.STATE, _state(state, state.start_ns)
+        for t_ns in range(state.start_ns, state.end_ns, NS_PER_S):
+            yield t_ns, topics.STATE, _state(state, t_ns)
     if shown.states:
         yield shown.end_ns, topics.STATE, _state(shown.states[-1], shown.end_ns)
 

@@ -39,10 +39,11 @@ def draw_robots(shown: Shown, sink: Sink) -> None:
         _draw_scans(number, pieces_of_scans(), shown, sink)
     _draw_parting(shown, sink)
     _draw_particles_and_plans(shown, sink)
-    for name, track in shown.runs:
+    for number, (name, track) in enumerate(shown.runs):
         frame = shown.redact(track.frame_id)
-        space = "map" if frame == shown.frame_id else rr.new_entity_path(["frames", frame])
-        _draw_path(rr.new_entity_path([*space.strip("/").split("/"), "runs", name]), track, sink)
+        space = ["map"] if frame == shown.frame_id else ["frames", frame]
+        entity = rr.new_entity_path([*space, "runs", name])
+        _draw_path(entity, track, sink, colours.RUNS[number % len(colours.RUNS)])
 
 
 def _draw_robot(entity: str, track: PoseTrack, colour: str, shown: Shown, sink: Sink) -> None:
@@ -87,7 +88,7 @@ def _draw_scans(number: int, pieces: Iterable[SceneScans], shown: Shown, sink: S
         sink.always(entity, point_look(2.0))
 
 
-def _draw_path(entity: str, track: PoseTrack, sink: Sink, colour: str = colours.PURPLE) -> None:
+def _draw_path(entity: str, track: PoseTrack, sink: Sink, colour: str) -> None:
     """All of it at all times, so that what is to come can be seen."""
     strips = [in_space(xy) for xy in pieces(track.xyyaw[:, :2])]
     sink.always(entity, rr.LineStrips3D(strips), line_look(colour, 2.0))
