@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Sequence
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -91,8 +90,10 @@ def _mcap(request: Request, folder: Path) -> Sequence[NotAsRecorded]:
 
 
 def _rerun(request: Request, folder: Path) -> Sequence[NotAsRecorded]:
-    analysis = import_module("slamreplay.export.rerun")
-    analysis.write_rerun(request.post, request.bundle.view(), folder, **_shared(request))
+    from slamreplay.export.rerun import write_rerun
+
+    assert request.post is not None
+    write_rerun(request.post, request.bundle.view(), folder, **_shared(request))
     return ()
 
 
