@@ -45,7 +45,7 @@ def test_a_whole_log_of_ros_1_becomes_the_same_bundle(sample, tmp_path):
 
     assert differences(sample, again) == []
     assert written.files == ["map.pgm", "map.yaml", "recorded.mcap"]
-    assert not written.not_written
+    assert not written.not_as_recorded
     assert {r.role: r.topic for r in again.manifest.roles} == {
         r.role: r.topic for r in sample.manifest.roles
     }
@@ -71,7 +71,7 @@ def test_something_of_every_kind_comes_back(logs, tmp_path):
                       "recoveries", "references", "signals", "map_updates"}  # fmt: skip
     _, written, again, _ = cut(bundle, tmp_path)
     assert differences(bundle, again) == []
-    assert not written.not_written
+    assert not written.not_as_recorded
 
 
 @settings(max_examples=4, deadline=None, phases=[Phase.generate])
@@ -178,9 +178,11 @@ def test_what_no_message_tells_is_said(sample, tmp_path):
     tables["commands"] = commands.replace(angular_velocity_xyz=turn)
     steered = type(sample)(sample.manifest, tables, sample.grids())
     written = write_export(Request(steered), Format.MCAP, tmp_path / "x")
-    (one,) = written.not_written
+    (one,) = written.not_as_recorded
     assert (one.what, one.count) == ("/cmd_vel", 5)
-    assert json.loads((tmp_path / "x" / "export.json").read_text())["not_written"] == [vars(one)]
+    assert json.loads((tmp_path / "x" / "export.json").read_text())["not_as_recorded"] == [
+        vars(one)
+    ]
 
 
 def test_the_command_lists_its_files_and_needs_no_post_mortem(tmp_path, monkeypatch):

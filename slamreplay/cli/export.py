@@ -162,9 +162,9 @@ def _report_of(post: Postmortem | None) -> str | None:
 
 
 def _tell(written: Written, output: Path, *, as_json: bool) -> None:
-    """The files on stdout; on stderr what the format has no place for."""
-    for missed in written.not_written:
-        complain(f"not written: {missed.what}: {missed.count}, {missed.reason}")
+    """The files on stdout; on stderr what they do not hold as it was recorded."""
+    for missed in written.not_as_recorded:
+        complain(f"not as recorded: {missed.what}: {missed.count}, {missed.reason}")
     if as_json:
         say_json({"folder": str(output), **written.head})
         return

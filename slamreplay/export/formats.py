@@ -51,8 +51,8 @@ _OF_FORMAT = {
 
 
 @dataclass(frozen=True)
-class NotWritten:
-    """Something of the log that the format has no place for."""
+class NotAsRecorded:
+    """Something of the log that the format has no place for, or tells in another way."""
 
     what: str
     count: int
@@ -64,7 +64,7 @@ class Written:
     """What came of it: `head` is export.json, whose files are relative to the folder."""
 
     head: dict[str, Any]
-    not_written: tuple[NotWritten, ...]
+    not_as_recorded: tuple[NotAsRecorded, ...]
 
     @property
     def files(self) -> list[str]:

@@ -4,19 +4,18 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Sequence
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 from slamreplay.bundle.atomic import atomic_folder
 from slamreplay.bundle.run import Run
 from slamreplay.bundle.view import Bundle
-from slamreplay.export.formats import MARKER, Format, NotWritten, Written
+from slamreplay.export.formats import MARKER, Format, NotAsRecorded, Written
 from slamreplay.export.request import Request, window_of
 
 __all__ = ["Request", "redacted", "window_of", "write_export"]
 
-Writer = Callable[[Request, Path], Sequence[NotWritten]]
+Writer = Callable[[Request, Path], Sequence[NotAsRecorded]]
 
 
 def redacted(bundle: Bundle, runs: Sequence[Run]) -> tuple[Bundle, list[Run]]:
@@ -44,7 +43,7 @@ def write_export(request: Request, to: Format, target: Path) -> Written:
 
 
 def _head(
-    request: Request, to: Format, files: list[str], missed: Sequence[NotWritten]
+    request: Request, to: Format, files: list[str], missed: Sequence[NotAsRecorded]
 ) -> dict[str, Any]:
     """export.json: only what is out of the usual has a key of its own."""
     head: dict[str, Any] = {"format": to.value, "files": files}
@@ -53,26 +52,26 @@ def _head(
     if request.redacted:
         head["redacted"] = True
     if missed:
-        head["not_written"] = [vars(one) for one in missed]
+        head["not_as_recorded"] = [vars(one) for one in missed]
     return head
 
 
-def _tum(request: Request, folder: Path) -> Sequence[NotWritten]:
+def _tum(request: Request, folder: Path) -> Sequence[NotAsRecorded]:
     from slamreplay.export.tum import write_tum
 
     write_tum(request, folder)
     return ()
 
 
-def _csv(request: Request, folder: Path) -> Sequence[NotWritten]:
+def _csv(request: Request, folder: Path) -> Sequence[NotAsRecorded]:
     from slamreplay.export.spreadsheets.writer import write_csv
 
     write_csv(request, folder)
     return ()
 
 
-def _mcap(request: Request, folder: Path) -> Sequence[NotWritten]:
-    missed: Sequence[NotWritten] = ()
+def _mcap(request: Request, folder: Path) -> Sequence[NotAsRecorded]:
+    missed: Sequence[NotAsRecorded] = ()
     if request.recorded:
         from slamreplay.export.recorded.writer import write_recorded
 
@@ -90,13 +89,15 @@ def _mcap(request: Request, folder: Path) -> Sequence[NotWritten]:
     return missed
 
 
-def _rerun(request: Request, folder: Path) -> Sequence[NotWritten]:
-    analysis = import_module("slamreplay.export.rerun")
-    analysis.write_rerun(request.post, request.bundle.view(), folder, **_shared(request))
+def _rerun(request: Request, folder: Path) -> Sequence[NotAsRecorded]:
+    from slamreplay.export.rerun import write_rerun
+
+    assert request.post is not None
+    write_rerun(request.post, request.bundle.view(), folder, **_shared(request))
     return ()
 
 
-def _rviz(request: Request, folder: Path) -> Sequence[NotWritten]:
+def _rviz(request: Request, folder: Path) -> Sequence[NotAsRecorded]:
     from slamreplay.export.rviz.writer import write_rviz
 
     write_rviz(request, folder)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from slamreplay.export.formats import NotWritten
+from slamreplay.export.formats import NotAsRecorded
 from slamreplay.export.recorded.selection import Rows
 from slamreplay.export.recorded.stream import (
     Composer,
@@ -36,7 +36,7 @@ def localization(rows: Mapping[str, Rows], ros: Composer) -> Encoded:
     streams += [_numbers(topic, own, ros) for topic, own in rows["signals"].of_topics().items()]
     closures = rows["closures"].of_topics()
     missed = [
-        NotWritten(topic, len(own), "closures of a graph: only their ends were kept")
+        NotAsRecorded(topic, len(own), "closures of a graph: only their ends were kept")
         for topic, own in closures.items()
     ]
     return Encoded(streams, missed)

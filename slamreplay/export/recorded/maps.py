@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from slamreplay.bundle.map_course import Held, map_course
 from slamreplay.bundle.tables import Table
 from slamreplay.bundle.view import Bundle
-from slamreplay.export.formats import NotWritten
+from slamreplay.export.formats import NotAsRecorded
 from slamreplay.export.recorded.stream import Composer, Encoded, Stream
 from slamreplay.export.request import Window
 from slamreplay.geometry.times import NO_STAMP
@@ -56,7 +56,7 @@ def maps(bundle: Bundle, window: Window, low_ns: int, ros: Composer) -> Encoded:
     missed = []
     if thinned := int((inside & ~kept).sum()):
         reason = "map versions that the bundle did not keep: the one before stands in"
-        missed.append(NotWritten(topic, thinned, reason))
+        missed.append(NotAsRecorded(topic, thinned, reason))
     order = np.argsort(t_log_ns, kind="stable")
     stream = Stream(
         topic,

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from slamreplay.export.formats import NotWritten
+from slamreplay.export.formats import NotAsRecorded
 from slamreplay.export.recorded.selection import Rows
 from slamreplay.export.recorded.stream import (
     Composer,
@@ -39,7 +39,7 @@ def motion(rows: Mapping[str, Rows], ros: Composer) -> Encoded:
         told = np.isfinite(turn).all(axis=1)
         if not told.all():
             reason = "steered: the angle was not kept"
-            missed.append(NotWritten(topic, int((~told).sum()), reason))
+            missed.append(NotAsRecorded(topic, int((~told).sum()), reason))
         if told.any():
             streams.append(_command(topic, own.take(told), ros))
     streams += [_joints(topic, own, ros) for topic, own in rows["joints"].of_topics().items()]

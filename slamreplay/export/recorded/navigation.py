@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from slamreplay.export.formats import NotAsRecorded
 from slamreplay.export.recorded.selection import Rows
 from slamreplay.export.recorded.stream import Composer, Encoded, Stream, groups, header_stamps
 from slamreplay.ingest.names import basename, tokens
@@ -14,10 +15,18 @@ from slamreplay.ingest.names import basename, tokens
 #: Levels of rosgraph_msgs/Log by those of rcl_interfaces/Log: ROS 1 counts in bits.
 _LEVELS = {1: 10, 2: 20, 4: 30, 8: 40, 16: 50}
 _BYTE = 255
+#: Types of cost grids that are kept as an OccupancyGrid.
+_GRIDS = frozenset({"Costmap", "VoxelGrid", "Grid"})
 
 
-def navigation(rows: Mapping[str, Rows], ros: Composer) -> Encoded:
-    """Streams of the tables plans, costmaps, costmap_updates, health and clock."""
+def navigation(rows: Mapping[str, Rows], types: Mapping[str, str], ros: Composer) -> Encoded:
+    """Streams of the tables plans, costmaps, costmap_updates, health and clock.
+
+    Args:
+        rows: of the tables.
+        types: the message type of topics where it is known.
+        ros: makes messages.
+    """
     streams = [_plans(topic, own, ros) for topic, own in rows["plans"].of_topics().items()]
     streams += [_grids(topic, own, ros) for topic, own in rows["costmaps"].of_topics().items()]
     updates = rows["costmap_updates"].of_topics()
@@ -26,7 +35,20 @@ def navigation(rows: Mapping[str, Rows], ros: Composer) -> Encoded:
         make = _lines if basename(topic).startswith("rosout") else _states
         streams.append(make(topic, own, ros))
     streams += [_clock(topic, own, ros) for topic, own in rows["clock"].of_topics().items()]
-    return Encoded(streams)
+    return Encoded(streams, _told_otherwise(rows, types))
+
+
+def _told_otherwise(rows: Mapping[str, Rows], types: Mapping[str, str]) -> list[NotAsRecorded]:
+    """Topics whose rows are told in a type of their own no more, as far as anybody can know."""
+    found = []
+    for topic, own in rows["costmaps"].of_topics().items():
+        kind = types.get(topic, "").rpartition("/")[2]
+        if kind in _GRIDS or "raw" in tokens(basename(topic)):
+            found.append(NotAsRecorded(topic, len(own), "told as nav_msgs/OccupancyGrid"))
+    for topic, own in rows["health"].of_topics().items():
+        if not basename(topic).startswith(("rosout", "diagnostics")):
+            found.append(NotAsRecorded(topic, len(own), "told as diagnostic_msgs/DiagnosticArray"))
+    return found
 
 
 def _plans(topic: str, rows: Rows, ros: Composer) -> Stream:

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from slamreplay.export.formats import NotWritten
+from slamreplay.export.formats import NotAsRecorded
 from slamreplay.export.recorded.selection import Rows
 from slamreplay.export.recorded.stream import Composer, Encoded, Stream, header_stamps
 
@@ -37,7 +37,7 @@ def ranging(rows: Mapping[str, Rows], types: Mapping[str, str], ros: Composer) -
         kind = types.get(topic, "").rpartition("/")[2]
         name = f"{topic}/scan" if topic in clouds else topic
         if kind in _MADE_OF:
-            missed.append(NotWritten(topic, len(own), _MADE_OF[kind]))
+            missed.append(NotAsRecorded(topic, len(own), _MADE_OF[kind]))
         streams.append(_scans(name, own, ros))
     streams += [_points(topic, own, ros) for topic, own in clouds.items()]
     return Encoded(streams, missed)

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slamreplay.bundle.recoveries import INFERRED, NAVIGATIONS
-from slamreplay.export.formats import NotWritten
+from slamreplay.export.formats import NotAsRecorded
 from slamreplay.export.recorded.selection import Rows
 from slamreplay.export.recorded.stream import Composer, Encoded, Stream, groups, header_stamps
 from slamreplay.ingest.action_names import action_of, is_recovery
@@ -40,9 +40,15 @@ def recovering(rows: Mapping[str, Rows], ros: Composer) -> Encoded:
     streams = _goals(own.take(goals), ros) + _tree(own.take(nodes), ros)
     left = own.take(~goals & ~nodes)
     missed = [
-        NotWritten(topic, len(part), "states of actions that no message of ours tells")
+        NotAsRecorded(topic, len(part), "states of actions that no message of ours tells")
         for topic, part in left.of_topics().items()
     ]
+    moved = nodes & (own.table["source"] != "behavior_tree")
+    for topic, part in own.take(moved).of_topics().items():
+        missed.append(NotAsRecorded(topic, len(part), "told in the log of the behaviour tree"))
+    for topic, part in own.take(goals).of_topics().items():
+        if not topic.endswith("/_action/status"):
+            missed.append(NotAsRecorded(topic, len(part), f"told on {_status_topic(topic)}"))
     return Encoded(streams, missed)
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from slamreplay.export.formats import NotWritten
+from slamreplay.export.formats import NotAsRecorded
 from slamreplay.export.recorded.localization import pose_stream
 from slamreplay.export.recorded.selection import Rows
 from slamreplay.export.recorded.stream import Composer, Encoded, Stream, given, header_stamps
@@ -25,7 +25,7 @@ def references(rows: Mapping[str, Rows], tf_topics: Collection[str], ros: Compos
     """Streams of the table references; tags that were seen on tf are there already."""
     streams: list[Stream] = []
     missed = [
-        NotWritten(topic, len(own), "motions between scans: no message tells them")
+        NotAsRecorded(topic, len(own), "motions between scans: no message tells them")
         for topic, own in rows["relations"].of_topics().items()
     ]
     for topic, own in rows["references"].of_topics().items():
@@ -43,9 +43,11 @@ def references(rows: Mapping[str, Rows], tf_topics: Collection[str], ros: Compos
     return Encoded(streams, missed)
 
 
-def _posed(topic: str, rows: Rows, ros: Composer, missed: list[NotWritten]) -> Stream:
+def _posed(topic: str, rows: Rows, ros: Composer, missed: list[NotAsRecorded]) -> Stream:
     if not topic.startswith("/"):
-        missed.append(NotWritten(topic, len(rows), f"a file's kind of reference: told on {GIVEN}"))
+        missed.append(
+            NotAsRecorded(topic, len(rows), f"a file's kind of reference: told on {GIVEN}")
+        )
         return pose_stream(GIVEN, rows, ros, with_covariance=True)
     t = rows.table
     if not (t["child_frame_id"] != "").any():
@@ -72,14 +74,14 @@ def _posed(topic: str, rows: Rows, ros: Composer, missed: list[NotWritten]) -> S
     return Stream(topic, "nav_msgs/Odometry", rows.t_log_ns, message)
 
 
-def _tags(topic: str, rows: Rows, ros: Composer, missed: list[NotWritten]) -> list[Stream]:
+def _tags(topic: str, rows: Rows, ros: Composer, missed: list[NotAsRecorded]) -> list[Stream]:
     """apriltag_ros's array, one tag a message: the common type that has pose and covariance."""
     numbers = [_TAG.fullmatch(str(name)) for name in rows.table["child_frame_id"]]
     told = np.array([n is not None for n in numbers], dtype=bool)
     told &= np.isfinite(rows.table["orientation_xyzw"]).all(axis=1)
     if not told.all():
         reason = "sightings without a number or a heading: no message tells them"
-        missed.append(NotWritten(topic, int((~told).sum()), reason))
+        missed.append(NotAsRecorded(topic, int((~told).sum()), reason))
     if not told.any():
         return []
     rows = rows.take(told)

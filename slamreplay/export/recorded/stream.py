@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slamreplay.bundle.tables import Table
-from slamreplay.export.formats import NotWritten
+from slamreplay.export.formats import NotAsRecorded
 from slamreplay.geometry import se3
 from slamreplay.geometry.times import NO_STAMP, NS_PER_S, Times
 from slamreplay.simulate.messages import Messages
@@ -43,7 +43,7 @@ class Encoded:
     """What became of some tables: streams, and what could not be told."""
 
     streams: Sequence[Stream]
-    not_written: Sequence[NotWritten] = ()
+    not_as_recorded: Sequence[NotAsRecorded] = ()
 
 
 class Composer(Messages):

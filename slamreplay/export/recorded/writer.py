@@ -11,7 +11,7 @@ import numpy as np
 
 from slamreplay.bundle.view import Bundle
 from slamreplay.errors import UsageError
-from slamreplay.export.formats import NotWritten
+from slamreplay.export.formats import NotAsRecorded
 from slamreplay.export.recorded.localization import localization
 from slamreplay.export.recorded.maps import maps, write_map_files
 from slamreplay.export.recorded.motion import motion
@@ -32,7 +32,7 @@ _TOLD = 200
 _NO_NAME = re.compile(r"[^A-Za-z0-9_/]+")
 
 
-def write_recorded(request: Request, folder: Path) -> list[NotWritten]:
+def write_recorded(request: Request, folder: Path) -> list[NotAsRecorded]:
     """Write the log and its map's files; returned is what of the bundle they do not hold.
 
     Raises:
@@ -49,7 +49,7 @@ def write_recorded(request: Request, folder: Path) -> list[NotWritten]:
         ranging(rows, types, ros),
         localization(rows, ros),
         references(rows, tf_topics, ros),
-        navigation(rows, ros),
+        navigation(rows, types, ros),
         recovering(rows, ros),
         maps(bundle, window, low_ns, ros),
     )
@@ -60,7 +60,7 @@ def write_recorded(request: Request, folder: Path) -> list[NotWritten]:
     latched = {s.topic for s in streams if s.latched}
     write_mcap(folder / FILE, store, messages, library=_LIBRARY, latched=latched)
     write_map_files(bundle, window, folder)
-    return [*(one for part in parts for one in part.not_written), *_left_out(bundle)]
+    return [*(one for part in parts for one in part.not_as_recorded), *_left_out(bundle)]
 
 
 def _named(parts: Sequence[Encoded]) -> list[Stream]:
@@ -91,9 +91,9 @@ def _merged(streams: Sequence[Stream], request: Request) -> Iterator[Record]:
             request.say("writing", done / len(order))
 
 
-def _left_out(bundle: Bundle) -> list[NotWritten]:
+def _left_out(bundle: Bundle) -> list[NotAsRecorded]:
     """What of tf no bundle's tree holds."""
     return [
-        NotWritten(f"tf {e.parent} -> {e.child}", e.samples, f"left out of the tree: {e.fault}")
+        NotAsRecorded(f"tf {e.parent} -> {e.child}", e.samples, f"left out of the tree: {e.fault}")
         for e in bundle.manifest.frames.left_out
     ]
