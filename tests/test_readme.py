@@ -15,12 +15,14 @@ import typer
 
 from slamreplay.bundle.findings import FINDINGS
 from slamreplay.bundle.role_tables import ROLE_TABLES
+from slamreplay.bundle.store import write_bundle
 from slamreplay.cli import main
 from slamreplay.estimators import ESTIMATORS
 from slamreplay.export.formats import Format
 from slamreplay.ingest.overrides import FRAME_KEYS
 from slamreplay.perturb import PERTURBATIONS, VARIANTS
 from slamreplay.report.model import Report
+from slamreplay.testing.synthetic import room_grid, synthetic_bundle
 from slamreplay.verdict.judgement import STATES
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -166,6 +168,24 @@ def test_commands_and_options_exist():
     prose = re.sub(r"```.*?```", "", TEXT, flags=re.DOTALL)
     assert set(re.findall(r"`(--[a-z-]+)", prose)) <= every
     assert set(known) <= {line.split("slamreplay ")[1].split()[0].strip("`,") for line in used}
+
+
+def test_the_example_for_notebooks_runs(tmp_path):
+    code = block("example: notebook")
+    code = code.replace('"my_robot.mcap", map="my_map.yaml"', "log, cause=False")
+    told = {"log": write_bundle_of_a_room(tmp_path / "b.bundle")}
+
+    exec(compile(code, str(README), "exec"), told)
+
+    assert told["r"].verdict.state == "lost"
+
+
+def write_bundle_of_a_room(target):
+    bundle = synthetic_bundle(seconds=6.0, belief_offset_xyyaw=(1.5, 0.5, 0.1))
+    names = ("scans", "odometry", "transforms", "poses", "initial_poses", "references")
+    tables = {name: bundle.table(name) for name in names}
+    write_bundle(target, bundle.manifest, tables, {"room": room_grid()})
+    return target
 
 
 @pytest.fixture(scope="module")
