@@ -33,6 +33,7 @@ const xToTime = (layout, end, x) =>
 
 function drawLanes(player) {
   const { context, width, height, ratio } = sharp(player.lanes);
+  if (!width || !height) return;
   const { scene, inks, t } = player;
   const key = [width, height, ratio, inks.paper, inks.ink, inks.belief].join();
   if (!player.course || player.course.key !== key) {

@@ -3,6 +3,7 @@
 function drawMap(player) {
   const { scene, view, inks, layers, t } = player;
   const { context, width, height } = sharp(player.map);
+  if (!width || !height) return; // not laid out: on paper before it was ready, or without a map
   view.width = width;
   view.height = height;
   if (!scene.head.window) return;
