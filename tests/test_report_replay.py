@@ -15,7 +15,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as npst
 
-from slamreplay.bundle.products import ChangedRegion, Changes, Hindsight
+from slamreplay.bundle.map_course import Held, MapStretch
+from slamreplay.bundle.products import ChangedRegion, Changes, Hindsight, Part
 from slamreplay.bundle.track import PoseTrack
 from slamreplay.evidence.result import Postmortem
 from slamreplay.evidence.scene import (
@@ -319,6 +320,26 @@ def test_a_frame_offset_is_taken_out_and_told(post):
     # Turned with the frame: long along y now.
     assert np.abs(np.cos(arrays["belief_ellipse"][2])).max() < 1e-3
     assert any("lies elsewhere" in note for note in replay.notes)
+
+
+def test_another_map_before_is_not_drawn_in_the_last_one(post):
+    held = Held(post.grid.version, START_NS + 2 * S, int(post.manifest.end_ns))
+    last = Part(MapStretch((held,)), post.hindsight)
+    later = replace(post, hindsight=replace(post.hindsight, parts=(last, last)))
+    replay = replay_of(later)
+    head, arrays = unpacked(replay.payload)
+
+    for name in ("belief_t", "hindsight_t", "scan0_t"):
+        assert (arrays[name].min() * head["tick_s"], len(arrays[name])) == (2.0, 20)
+    assert arrays["lane0_t"][0] == 0  # the timeline is the whole log's
+    assert any("Until 2.0 s" in note for note in replay.notes)
+
+
+def test_marks_beyond_the_log_stand_at_its_edge(post):
+    early = Mark("finding", START_NS - 3 * S, START_NS + 99 * S, "all along", "warning")
+    head, _ = unpacked(replay_of(replace(post, scene=replace(post.scene, marks=(early,)))).payload)
+
+    assert (head["marks"][0]["t"], head["marks"][0]["end"]) == (0.0, head["end_s"])
 
 
 LACKING = {
