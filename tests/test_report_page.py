@@ -19,6 +19,7 @@ from slamreplay.consistency.audits.inspection import clock_and_frames
 from slamreplay.evidence.scene import Scene
 from slamreplay.ingest.pipeline import ingest
 from slamreplay.postmortem import postmortem
+from slamreplay.report.audit_tables import edges, streams
 from slamreplay.report.figures.canvas import FAINT, INK
 from slamreplay.report.figures.neutral import DARK_PAPER, dark_of
 from slamreplay.report.finding_rows import MOST_FINDINGS
@@ -305,3 +306,28 @@ def test_the_name_in_the_margin_is_one_string():
     assert "</style" not in style
     assert "\\22 \\7d " in style
     assert "..." in print_style("long" * 50)
+
+
+def test_the_audit_tells_rates_gaps_and_delays_of_each_stream_and_edge(posts):
+    lost = posts["lost"]
+    gap = {"start_ns": START_NS + 2 * S, "end_ns": START_NS + 5 * S, "missing": 29}
+    audit = {**lost.audit, "clock": {**lost.audit["clock"]}}
+    first, *others = audit["clock"]["topics"]
+    audit["clock"]["topics"] = [
+        {**first, "gap_count": 2, "gaps": [gap], "missing": 31, "backward_stamps": 3,
+         "jumps": [{"seconds": -0.2}], "log_minus_stamp_median_s": 0.0123, "drift_ppm": 40.2},
+        *others,
+    ]  # fmt: skip
+    found = streams(replace(lost, audit=audit))
+    row = [(cell.text, cell.aside) for cell in found.rows[0]]
+
+    assert row[0][0] == first["topic"]
+    assert row[3] == ("2, up to 3.00 s", "31 messages missing")
+    assert found.rows[0][3].links == (("2, up to 3.00 s", "#t=2"),)
+    assert row[4][0] == "12.3 ms"
+    assert row[5][0] == "+40 ppm"
+    assert row[6][0] == "a jump of -0.200 s, 3 go back"
+    pairs = [cells[0].text for cells in edges(lost).rows]
+    assert "odom \N{RIGHTWARDS ARROW} base_link" in pairs
+    assert streams(posts["bare"]).rows == edges(posts["bare"]).rows == ()
+    assert postmortem(synthetic_bundle(seconds=4.0)).audit["frames"]["base"] == "base_link"
