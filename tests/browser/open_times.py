@@ -72,9 +72,8 @@ def opened(browser, path: Path) -> dict[str, float]:
         page.wait_for_selector("#replay[data-state=ready]", timeout=60_000)
         page.locator("#replay-map").focus()
         answer = page.evaluate(_ANSWER)
-    page.wait_for_function(
-        "performance.getEntriesByName('first-contentful-paint').length > 0", timeout=10_000
-    )
+    while not page.evaluate("performance.getEntriesByName('first-contentful-paint').length"):
+        page.wait_for_timeout(20)
     times = {**page.evaluate(_TIMES), "answer": answer}
     context.close()
     return times

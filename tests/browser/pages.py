@@ -1,6 +1,10 @@
 """What several tests ask of a page."""
 
+import io
 import json
+
+import numpy as np
+from PIL import Image
 
 
 def words(text):
@@ -21,3 +25,8 @@ def summary(reports, name):
 def open_details(page):
     """Unfold all that is folded."""
     page.evaluate("document.querySelectorAll('details').forEach(d => { d.open = true })")
+
+
+def pixels(element):
+    """(H, W, 3) what an element looks like."""
+    return np.asarray(Image.open(io.BytesIO(element.screenshot())).convert("RGB"))

@@ -87,7 +87,7 @@ def test_text_of_a_log_is_text(show):
 
 
 @pytest.mark.parametrize("size", [PHONE, NARROW, ZOOMED], ids=["phone", "320px", "zoom200"])
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", [*NAMES, "hostile"])
 def test_nothing_scrolls_sideways(show, name, size):
     page = show(name, **size)
 

@@ -3,6 +3,8 @@
 # Violations of the policy are events of the document; this says them where all else is said.
 _POLICY = """document.addEventListener('securitypolicyviolation', e => console.error(
   `policy violated: ${e.violatedDirective} ${e.blockedURI} ${e.sample}`));"""
+#: Nothing that is asked of a page from the disk takes so long, on a busy machine either.
+_PATIENCE_MS = 20_000
 #: What a page may say: nobody must look after it.
 _HARMLESS = ("log", "debug", "info", "startGroup", "endGroup")
 
@@ -19,6 +21,7 @@ class Watched:
         self.url = path.resolve().as_uri()
         self.noted: list[str] = []
         self.context = browser.new_context(**options)
+        self.context.set_default_timeout(_PATIENCE_MS)
         if options.get("java_script_enabled", True):
             self.context.add_init_script(_POLICY)
         self.context.route("**/*", self._route)
