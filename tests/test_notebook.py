@@ -291,6 +291,7 @@ def test_saved_and_opened_again_it_has_the_same_tables(r, tmp_path, monkeypatch)
     monkeypatch.setattr(
         "slamreplay.report.figure_files.write_figures", lambda _, folder: drawn.append(folder)
     )
+    monkeypatch.setattr("slamreplay.report.writer.html", lambda _: "a page")  # slow, and not asked
     page = r.save(tmp_path / "r", figures=tmp_path / "f")
     again = sr.open(tmp_path / "r")
 
