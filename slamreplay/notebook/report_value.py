@@ -129,7 +129,9 @@ class Report:
         from slamreplay.evidence.scene_lanes import scene_lanes
         from slamreplay.notebook.frames import lanes_frame
 
-        return lanes_frame(scene_lanes(self._whole("lanes")), self._start_ns)
+        post = self._whole("lanes")
+        lanes = scene_lanes(post) if post.scene is None else post.scene.lanes
+        return lanes_frame(lanes, self._start_ns)
 
     @property
     def figures(self) -> list[str]:
