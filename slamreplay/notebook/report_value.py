@@ -101,6 +101,25 @@ class Report:
         return with_units(frame)
 
     @cached_property
+    def ledger(self) -> pd.DataFrame:
+        """What the measurements of each source did to each run, in a few numbers."""
+        from slamreplay.report.model import LedgerSourcePart
+
+        return self._frame(self.content.ledger.sources, LedgerSourcePart)
+
+    @cached_property
+    def trace(self) -> pd.DataFrame:
+        """Measurements around the moment that was asked for, by run, the strongest first."""
+        from slamreplay.report.model import TraceRowPart
+
+        runs = [] if self.content.trace is None else self.content.trace.runs
+        frame = self._frame([row for run in runs for row in run.rows], TraceRowPart)
+        whose = [(run.estimator, run.perturbation) for run in runs for _ in run.rows]
+        for place, name in enumerate(("estimator", "perturbation")):
+            frame.insert(place, name, [pair[place] for pair in whose])
+        return frame
+
+    @cached_property
     def root_cause(self) -> pd.DataFrame:
         """Causes that were tried, the most probable first; in `attrs` what it began as."""
         from slamreplay.report.model import CandidatePart
