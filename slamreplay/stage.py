@@ -24,7 +24,7 @@ class Stage(ModuleType):
     """A package that passes calls on; its documentation and signature are the function's."""
 
     def __call__(self, *args: Any, **kwargs: Any) -> Any:
-        """Do it."""
+        """As the function of its name in `slamreplay.notebook`, whose result it gives."""
         return _function(self)(*args, **kwargs)
 
     @property

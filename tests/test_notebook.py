@@ -231,6 +231,16 @@ def test_trajectories_and_lanes(r):
     assert np.nanmax(error["value"]) == pytest.approx(np.nanmax(far))
 
 
+def test_what_moved_the_belief_is_told_of_a_moment(log, r):
+    traced = sr.report(log, cause=False, trace=4.0)
+
+    assert len(r.trace) == 0
+    assert set(r.ledger["estimator"]) == {"recorded"}
+    assert set(traced.trace["estimator"]) == {"recorded"}
+    assert traced.trace["t_s"].sub(4.0).abs().min() < 2.0
+    assert "moved_m" in traced.trace.attrs["units"]
+
+
 def test_every_figure_is_drawn_in_a_figure_that_pyplot_shows(r):
     before = dict(mpl.rcParams)
     for name in r.figures:
@@ -291,6 +301,7 @@ def test_saved_and_opened_again_it_has_the_same_tables(r, tmp_path, monkeypatch)
     monkeypatch.setattr(
         "slamreplay.report.figure_files.write_figures", lambda _, folder: drawn.append(folder)
     )
+    monkeypatch.setattr("slamreplay.report.writer.html", lambda _: "a page")  # slow, and not asked
     page = r.save(tmp_path / "r", figures=tmp_path / "f")
     again = sr.open(tmp_path / "r")
 

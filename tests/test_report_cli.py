@@ -13,6 +13,7 @@ from slamreplay.bundle.store import write_bundle
 from slamreplay.cli import explain, list_, report
 from slamreplay.errors import OutputError, UsageError
 from slamreplay.perturb import PERTURBATIONS
+from slamreplay.report.figures.panels import PANELS
 from slamreplay.testing.synthetic import room_grid, synthetic_bundle
 
 
@@ -78,7 +79,10 @@ def test_foreign_output_is_refused_before_any_work(app, bundle_folder, tmp_path)
     assert [p.name for p in tmp_path.iterdir()] == ["thesis.tex"]
 
 
-def test_figures_are_told_on_stderr_and_json_stays_the_report(app, bundle_folder, tmp_path):
+def test_figures_are_told_on_stderr_and_json_stays_the_report(
+    app, bundle_folder, tmp_path, monkeypatch
+):
+    monkeypatch.setattr("slamreplay.report.figure_files.PANELS", {"map": PANELS["map"]})
     figures = tmp_path / "r" / "figures"
     result = run(app, "report", bundle_folder, "-o", tmp_path / "r", "--figures", figures, "--json")
 

@@ -53,7 +53,7 @@ def export(
 
     form = _format(to)
     halves = needs(form, None if only is None else Only(only), covariance=covariance)
-    check_target(Path(output), MARKER, "output")
+    check_target(Path(output), MARKER, "output=")
     of = found(evidence, {}, progress)
     bundle, runs = of.log.bundle, list(of.runs)
     window = window_of(bundle, start, end)
@@ -63,14 +63,14 @@ def export(
         post = postmortem(bundle, runs, progress=tell) if halves.analysis else None
         request = Request(
             bundle,
-            runs,
-            window,
-            post,
-            None if post is None else build(post).json_text(),
-            halves.recorded,
-            covariance,
-            redact,
-            tell,
+            runs=runs,
+            window=window,
+            post=post,
+            report_json=None if post is None else build(post).json_text(),
+            recorded=halves.recorded,
+            covariance=covariance,
+            redacted=redact,
+            progress=tell,
         )
         written = write_export(request, form, Path(output))
     return [Path(output) / name for name in written.files]

@@ -101,6 +101,25 @@ class Report:
         return with_units(frame)
 
     @cached_property
+    def ledger(self) -> pd.DataFrame:
+        """What the measurements of each source did to each run, in a few numbers."""
+        from slamreplay.report.model import LedgerSourcePart
+
+        return self._frame(self.content.ledger.sources, LedgerSourcePart)
+
+    @cached_property
+    def trace(self) -> pd.DataFrame:
+        """Measurements around the moment that was asked for, by run, the strongest first."""
+        from slamreplay.report.model import TraceRowPart
+
+        runs = [] if self.content.trace is None else self.content.trace.runs
+        frame = self._frame([row for run in runs for row in run.rows], TraceRowPart)
+        whose = [(run.estimator, run.perturbation) for run in runs for _ in run.rows]
+        for place, name in enumerate(("estimator", "perturbation")):
+            frame.insert(place, name, [pair[place] for pair in whose])
+        return frame
+
+    @cached_property
     def root_cause(self) -> pd.DataFrame:
         """Causes that were tried, the most probable first; in `attrs` what it began as."""
         from slamreplay.report.model import CandidatePart
@@ -129,7 +148,9 @@ class Report:
         from slamreplay.evidence.scene_lanes import scene_lanes
         from slamreplay.notebook.frames import lanes_frame
 
-        return lanes_frame(scene_lanes(self._whole("lanes")), self._start_ns)
+        post = self._whole("lanes")
+        lanes = scene_lanes(post) if post.scene is None else post.scene.lanes
+        return lanes_frame(lanes, self._start_ns)
 
     @property
     def figures(self) -> list[str]:

@@ -30,12 +30,12 @@ def report(
     Args:
         evidence: what `sr.ingest`, `sr.perturb` or `sr.open` gave, or the path of a log, of a
             bundle or of runs.
-        map: of a raw log, as of `sr.ingest`; so are topics, robot, reference, start and end.
-        topics: see there.
-        robot: see there.
-        reference: see there.
-        start: see there.
-        end: see there.
+        map: of a raw log: map_server yaml that was driven on.
+        topics: of a raw log: yaml of `role: topic`.
+        robot: of a raw log: namespace or number of the robot to look at.
+        reference: of a raw log: poses that judge, as TUM or CSV, or relations.
+        start: of a raw log: leave out what is earlier, s from its start.
+        end: of a raw log: leave out what is later, s from its start.
         hold_out: kinds of sensed references (fiducial, dock, gnss) that judge hindsight instead of
             joining it.
         cause: replay what went wrong with one thing put right at a time, to name its root cause.
@@ -65,7 +65,7 @@ def report(
 
     check_held_out(hold_out)
     if output is not None:
-        check_target(Path(output), MARKER, "output")
+        check_target(Path(output), MARKER, "output=")
     options = {"map": map, "topics": topics, "robot": robot, "reference": reference,
                "start": start, "end": end}  # fmt: skip
     of = found(evidence, options, progress)

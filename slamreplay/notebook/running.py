@@ -66,7 +66,7 @@ def perturb(
 
     texts, names = _several(perturbations), _several(estimators)
     if output is not None:
-        check_target(Path(output), RUNS, "output")
+        check_target(Path(output), RUNS, "output=")
     for text in texts:  # before time is spent on reading the log
         parse_perturbation(text)
     for name in names:
