@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import typer
 from evo.tools import file_interface
+from scipy.spatial.transform import Rotation
 from typer.testing import CliRunner
 
 from slamreplay.bundle.run import Estimate, Run, Trial
@@ -16,7 +17,11 @@ from slamreplay.cli import export, perturb
 from slamreplay.errors import OutputError, UsageError
 from slamreplay.export.request import Request
 from slamreplay.export.tum import bundle_as_tum, runs_as_tum, trial_name, write_tum
-from slamreplay.geometry.covariance import planar_from_ros
+from slamreplay.geometry.covariance import (
+    openvins_from_ros,
+    planar_from_ros,
+    ros_from_openvins,
+)
 from slamreplay.ingest.reference_file import read_reference
 from slamreplay.testing.synthetic import synthetic_bundle
 
@@ -158,3 +163,14 @@ def test_a_folder_of_somebody_else_stays(bundle, tmp_path):
     ran = call("export", bundle, "--to", "tum", "-o", tmp_path / "D")
     assert isinstance(ran.exception, OutputError)
     assert [p.name for p in (tmp_path / "D").iterdir()] == ["x"]
+
+
+def test_openvins_blocks_are_turned_into_the_body_and_back():
+    """At a pose in space: in the plane the turn would leave the heading's variance as it is."""
+    rng = np.random.default_rng(5)
+    A = rng.normal(size=(2, 3, 3))
+    rotation, position = A @ np.swapaxes(A, 1, 2)
+    R = Rotation.from_rotvec([0.3, -0.7, 1.1]).as_matrix()
+    back = openvins_from_ros(ros_from_openvins(rotation, position, R), R)
+    np.testing.assert_allclose(back[0], rotation, atol=1e-12)
+    np.testing.assert_allclose(back[1], position, atol=1e-12)
