@@ -45,7 +45,7 @@ function momentText(scene, t) {
     parts.push("where it really was is not known");
   } else if (scene.tracks.hindsight && !poseAt(scene.tracks.belief, t)) {
     parts.push("no belief was told");
-  }
+  } else if (scene.tracks.odometry) parts.push("only odometry tells where it was");
   if (known.sigma_m != null) parts.push(`sigma ${digits(known.sigma_m)} m`);
   if (known.nees != null) parts.push(`NEES ${digits(known.nees)}`);
   if (known.changed_share != null) {
