@@ -1,11 +1,13 @@
 """The answer in ten lines says what the report says, whatever the log had and lacked."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
 from slamreplay.bundle.findings import Finding
 from slamreplay.bundle.products import ChangedRegion
+from slamreplay.cli.summary import show_summary
 from slamreplay.postmortem import postmortem
 from slamreplay.report.facts import deciding_facts
 from slamreplay.report.summary import summary_lines, summary_text
@@ -39,6 +41,23 @@ def test_ten_lines_the_verdict_first(post):
     assert len(rest) == 8
     assert summary_text(post).splitlines()[0] == f"lost: {first.text}"
     assert len(summary_text(post).splitlines()) == 10
+
+
+@pytest.mark.parametrize("columns", ["", "30"])
+def test_the_terminal_ends_with_the_path_alone_however_narrow(post, columns, monkeypatch, capsys):
+    monkeypatch.setenv("COLUMNS", columns)
+    page = Path("a folder with a long name, and another one in it") / "report.html"
+
+    show_summary(post, page)
+    lines = capsys.readouterr().out.splitlines()
+
+    assert lines[0].startswith("lost (")
+    assert lines[-1] == str(page)
+    assert any(line.startswith("! belief ") for line in lines)
+    if columns:
+        assert max(map(len, lines[:-1])) <= 30
+    else:
+        assert len([line for line in lines if not line.startswith("  jumps")]) == 10 + 1
 
 
 def test_the_three_facts_are_the_pages(post, lines):
