@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from beam_truth import UNASKED, truth_of_beams
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from slamreplay.bundle.manifest import Role
@@ -444,15 +444,24 @@ def test_constant_offset_of_the_localizers_map_is_taken_out_of_particles_and_pla
     )
 
 
+def test_more_moments_than_scans_still_are_looked_at():
+    t_ns = np.arange(0, 10**12, 10**9)
+    rows = chosen(t_ns, np.arange(5 * 10**11, 6 * 10**11, 10**9).tolist(), 40)
+
+    assert len(rows) <= 40
+    assert np.count_nonzero((rows >= 500) & (rows < 600)) >= 20
+
+
 @given(
     st.lists(st.integers(0, 10**6), min_size=1, max_size=60).map(sorted),
     st.lists(st.integers(-100, 10**6 + 100), max_size=8),
     st.integers(2, 40),
 )
+@example([0, 1, 2, 3, 4], [2], 2)
 def test_chosen_rows_hold_the_first_and_the_last_and_are_within_bounds(t_ns, moments, most):
     t_ns = np.array(t_ns, dtype=np.int64)
     rows = chosen(t_ns, moments, most)
 
-    assert len(rows) <= max(most, 0)
+    assert len(rows) <= most
     assert (np.diff(rows) > 0).all()
     assert (t_ns[rows[0]], t_ns[rows[-1]]) == (t_ns[0], t_ns[-1])

@@ -79,14 +79,17 @@ def chosen(
     Args:
         t_ns: (N,) ascending.
         moments_ns: shared out evenly among them is half of what may be shown.
-        most: how many at the most; None for all.
+        most: how many at the most, two or more; None for all.
     """
     if most is None or len(t_ns) <= most:
         return np.arange(len(t_ns))
     moments = np.unique(np.asarray(moments_ns, dtype=np.int64))
-    each = int(_DENSE_SHARE * most) // max(len(moments), 1)
+    room = max(min(int(_DENSE_SHARE * most), most - 2), 0)
+    if len(moments) > room:  # some of them, evenly
+        moments = moments[np.linspace(0, len(moments) - 1, room).astype(np.int64)]
     dense = np.zeros(0, dtype=np.int64)
-    if len(moments) and each:
+    if len(moments):
+        each = room // len(moments)
         steps = np.linspace(-AROUND_NS, AROUND_NS, each + 1)[:-1] + AROUND_NS / each
         around = (moments[:, None] + steps.astype(np.int64)).ravel()
         around = around[(around >= t_ns[0]) & (around <= t_ns[-1])]
