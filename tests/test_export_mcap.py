@@ -22,10 +22,12 @@ from slamreplay.evidence.scene_of import scene_of
 from slamreplay.evidence.scene_scans import scans_in_pieces, scene_scans
 from slamreplay.export.foxglove import write_foxglove
 from slamreplay.geometry import se2
+from slamreplay.geometry.covariance import turned
 from slamreplay.geometry.times import NS_PER_S
 from slamreplay.ingest.pipeline import ingest
 from slamreplay.postmortem import postmortem
 from slamreplay.testing.synthetic import START_NS, synthetic_bundle
+from slamreplay.verdict.judgement import ConstantOffset
 
 TYPES = {
     PackedElementField.FLOAT32: "<f4",
@@ -406,3 +408,20 @@ def test_pieces_of_scans_are_the_whole(looked_back):
     for name in ("t_ns", "ends_m", "is_hit", "met"):
         joined = np.concatenate([getattr(p, name) for p in parts])
         np.testing.assert_array_equal(joined, getattr(whole, name)[3:38])
+
+
+def test_a_constant_offset_of_the_localizers_map_is_taken_out(found, tmp_path):
+    bundle, post, _ = found
+    offset = ConstantOffset((3.0, -1.0, 0.5), 3.2, 0.5, 0.1, "map")
+    told = replace(post.belief, xyyaw=se2.compose(np.array(offset.xyyaw), post.belief.xyyaw),
+                   cov=turned(post.belief.cov, np.full(len(post.belief), 0.5)))  # fmt: skip
+    moved = replace(post, belief=told, frame_offset=offset)
+    poses = []
+    for one in (post, moved):
+        said = written((bundle, one, ()), tmp_path)["belief/pose"]
+        poses.append([xyyaw(message.pose) for _, message in said])
+    own, there = poses
+
+    assert len(own) > 10
+    np.testing.assert_allclose(there, own, atol=1e-9)
+    np.testing.assert_allclose(moved.belief_on_map.cov, post.belief.cov, atol=1e-12)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -24,6 +24,7 @@ from slamreplay.evidence.ledger import LedgerSet, ledger_sets
 from slamreplay.evidence.scene import Scene
 from slamreplay.evidence.trace import RunTrace, trace
 from slamreplay.geometry import se2
+from slamreplay.geometry.covariance import turned
 from slamreplay.geometry.times import seconds_since
 from slamreplay.maps.grid import OccupancyGrid
 from slamreplay.replay.dose import DoseResults
@@ -139,17 +140,27 @@ class Postmortem:
         return se2.compose(se2.inverse(self.frame_offset.xyyaw), xyyaw)
 
     @cached_property
+    def belief_on_map(self) -> PoseTrack | None:
+        """The belief as it is drawn beside hindsight: without that constant offset."""
+        belief = self.belief
+        if belief is None or self.frame_offset is None:
+            return belief
+        yaw = -np.full(len(belief), self.frame_offset.xyyaw[2])
+        return replace(belief, xyyaw=self.on_map(belief.xyyaw), cov=turned(belief.cov, yaw))
+
+    @cached_property
     def error(self) -> BeliefError | None:
         """Belief against hindsight at the belief's times, None without either.
 
         As the verdict sees it: without the constant offset of a map frame that lies elsewhere.
         """
-        if self.belief is None or self.hindsight is None:
+        belief = self.belief_on_map
+        if belief is None or self.hindsight is None:
             return None
-        where = self.hindsight.track.at(self.belief.t_ns)
-        step = self.on_map(self.belief.xyyaw) - where.xyyaw
+        where = self.hindsight.track.at(belief.t_ns)
+        step = belief.xyyaw - where.xyyaw
         return BeliefError(
-            self.belief.t_ns,
+            belief.t_ns,
             np.hypot(step[:, 0], step[:, 1]),
             np.abs(se2.wrap_angle(step[:, 2])),
             where,

@@ -136,7 +136,7 @@ def shown(
         start_ns=start_ns,
         end_ns=end_ns,
         place_ns=place_ns,
-        belief=_cut(post.belief, place_ns, end_ns),
+        belief=_cut(post.belief_on_map, place_ns, end_ns),
         hindsight=None if hindsight is None else _cut(hindsight.track, place_ns, end_ns),
         runs=tuple(
             (name, cut) for name, t in tracks if (cut := _cut(t, start_ns, end_ns)) is not None

@@ -107,7 +107,7 @@ def _footprint(topic: str, frame: str, track: PoseTrack, shown: Shown, colour: s
 
 def _parting(shown: Shown) -> Stream:
     """A line between both robots whenever they are farther apart than the verdict allows."""
-    error, belief = shown.post.error, shown.post.belief
+    error, belief = shown.post.error, shown.post.belief_on_map
     if error is None or belief is None:
         return
     rows = shown.rows(error.t_ns)

@@ -96,7 +96,7 @@ def _draw_path(entity: str, track: PoseTrack, sink: Sink, colour: str) -> None:
 
 def _draw_parting(shown: Shown, sink: Sink) -> None:
     """A line between both robots whenever they are farther apart than the verdict allows."""
-    error, belief = shown.post.error, shown.post.belief
+    error, belief = shown.post.error, shown.post.belief_on_map
     if error is None or belief is None:
         return
     rows = shown.rows(error.t_ns)

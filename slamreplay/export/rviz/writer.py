@@ -60,7 +60,7 @@ def write_rviz(request: Request, folder: Path) -> None:
         files = map_files(grid, name) if name == "map" else overlay_files(grid, name)
         for file, content in files.items():
             (folder / file).write_bytes(content)
-    tracks = {"belief": post.belief, "hindsight": None if found is None else found.track}
+    tracks = {"belief": post.belief_on_map, "hindsight": None if found is None else found.track}
     paths = {
         name: track.take(track.has_pose & request.holds(track.t_ns))
         for name, track in tracks.items()

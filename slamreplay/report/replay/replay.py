@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from slamreplay.bundle.track import PoseTrack
 from slamreplay.evidence.result import Postmortem
 from slamreplay.evidence.scene import Lane, Scene
-from slamreplay.geometry.covariance import turned
 from slamreplay.report.figures.canvas import thinned
 from slamreplay.report.replay import head, words
 from slamreplay.report.replay.beams import PackedScans, packed_scans
@@ -108,16 +107,7 @@ def _tracks(post: Postmortem) -> dict[str, PoseTrack]:
     """What is drawn, in the map of the log's end; odometry where nothing better is known."""
     since = post.drawn_from_ns
     hindsight = None if post.hindsight is None else known(post.hindsight.track, since)
-    belief = known(post.belief, since)
-    if belief is not None and post.frame_offset is not None:
-        yaw = -np.full(len(belief), post.frame_offset.xyyaw[2])
-        belief = PoseTrack(
-            belief.frame_id,
-            belief.child_frame_id,
-            belief.t_ns,
-            post.on_map(belief.xyyaw),
-            turned(belief.cov, yaw),
-        )
+    belief = known(post.belief_on_map, since)
     found = {"belief": belief, "hindsight": hindsight}
     if belief is None and hindsight is None:
         found = {"odometry": known(post.odometry, post.manifest.start_ns)}
