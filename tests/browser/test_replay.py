@@ -407,3 +407,71 @@ def test_screenshots_of_the_replay(replay, screenshots, name):
         seen.page.emulate_media(color_scheme=scheme)
         seen.settle()
         seen.section.screenshot(path=screenshots / f"{name}_replay_{scheme}.png")
+
+
+def test_timeline_goes_where_it_is_clicked(replay):
+    seen = replay()
+    box = seen.page.locator("#replay-lanes").bounding_box()
+    lanes, at = seen.page.locator("#replay-lanes"), []
+    for share in (0.3, 0.5, 0.7):
+        lanes.click(position={"x": share * box["width"], "y": box["height"] - 30})
+        at.append(seen.t)
+
+    assert 0.0 < at[0] < at[1] < at[2] < seen.end()
+    assert at[2] - at[1] == pytest.approx(at[1] - at[0], rel=0.02)
+
+
+def test_a_link_keeps_the_view(replay):
+    seen = replay(permissions=["clipboard-read", "clipboard-write"])
+    seen.go(9.0)
+    seen.press("+", "+", "a", "w")
+
+    seen.press("l")
+    seen.page.wait_for_timeout(100)
+    link = seen.page.evaluate("navigator.clipboard.readText()")
+    other = replay("lost", link[link.index("#") :])
+
+    assert other.px_per_m == pytest.approx(seen.px_per_m, rel=0.01)
+    assert differing(seen.picture(), other.picture()) < 0.02
+
+
+def test_following_keeps_the_robot_in_the_middle(replay, reports):
+    """What is around the middle stays the robot, and the map moves under it."""
+    seen = replay()
+    seen.show("map")
+    seen.go(5.0)
+    seen.press("f")
+    early = seen.picture()
+
+    seen.go(12.0)
+
+    assert seen.page.locator("#replay-follow").get_attribute("aria-pressed") == "true"
+    assert differing(early, seen.picture()) > 0.02
+    seen.press("f")
+    late = seen.picture()
+    seen.go(20.0)
+    assert differing(late, seen.picture()) == 0.0
+
+
+def test_measure_without_a_pointer(replay):
+    seen = replay()
+
+    seen.press("+", "m", "Enter", "a", "a", "Enter")
+
+    metres = float(re.search(r"([\d.]+) m\b", seen.said)[1])
+    assert metres == pytest.approx(120 / seen.px_per_m, rel=0.01)
+
+
+def test_less_motion_plays_stills(replay):
+    seen = replay(reduced_motion="reduce")
+    seen.go(2.0)
+    seen.page.evaluate(
+        """() => { window.__moments = 0; new MutationObserver(() => { window.__moments++ })
+             .observe(document.getElementById('replay'), {attributeFilter: ['data-t']}) }"""
+    )
+
+    seen.page.locator("#replay-play").click()
+    seen.until_t("> 3.4")
+    seen.page.locator("#replay-play").click()
+
+    assert seen.page.evaluate("window.__moments") <= 6
