@@ -1,6 +1,7 @@
 """`export --to csv` and `--to rviz`: read back by pandas, PyYAML, Pillow and map_server's rules."""
 
 import json
+import shlex
 from dataclasses import replace
 
 import numpy as np
@@ -19,6 +20,7 @@ from slamreplay.export.formats import Format
 from slamreplay.export.spreadsheets.columns import cells_of
 from slamreplay.export.writers import Request, window_of, write_export
 from slamreplay.geometry.times import NO_STAMP
+from slamreplay.maps.grid import OccupancyGrid
 from slamreplay.maps.map_server import read_map
 from slamreplay.postmortem import postmortem
 from slamreplay.testing.synthetic import synthetic_bundle
@@ -77,13 +79,14 @@ def test_tables_read_back_by_pandas_are_equal(looked_back, tmp_path):
     assert list(told)[-1] == "twist_covariance_rz_rz"
 
 
-def test_a_spreadsheet_computes_no_text_of_a_log():
+@pytest.mark.parametrize("before", ["", "\t", "\r", "\n"])
+def test_a_spreadsheet_computes_no_text_of_a_log(before):
     row = {
         "t_ns": [1], "t_sensor_ns": [NO_STAMP], "t_log_ns": [1], "topic": ["/rosout"],
-        "level": [1], "name": ["=HYPERLINK(0)"], "message": ["lost"],
+        "level": [1], "name": [f"{before}=HYPERLINK(0)"], "message": ["lost"],
     }  # fmt: skip
     cells = {c.name: c.values.to_pylist() for c in cells_of(Table(TABLES["health"], row))}
-    assert (cells["name"], cells["message"]) == (["'=HYPERLINK(0)"], ["lost"])
+    assert (cells["name"], cells["message"]) == ([f"'{before}=HYPERLINK(0)"], ["lost"])
     assert cells["t_sensor_ns"] == [None]
 
 
@@ -181,6 +184,16 @@ def test_rviz_shows_what_the_log_plays(looked_back, tmp_path):
     assert path.poses[0].pose.position.x == pytest.approx(start[0])
     readme = (tmp_path / "x" / "README.txt").read_text()
     assert "ros2 run nav2_map_server map_server" in readme
+
+
+def test_a_frame_of_a_log_does_nothing_in_a_shell(looked_back, tmp_path):
+    bundle, post = looked_back
+    frame = "map; touch 'x'"
+    grid = OccupancyGrid(post.grid.cells, post.grid.resolution_m, post.grid.origin_xyyaw, frame)
+    write_export(Request(bundle, post=replace(post, grid=grid)), Format.RVIZ, tmp_path / "x")
+    text = (tmp_path / "x" / "README.txt").read_text()
+    command = text[text.index("ros2 run nav2_map_server") :].split("\n  ros2")[0]
+    assert f"frame_id:={frame}" in shlex.split(command.replace("\\\n", " "))
 
 
 def test_without_a_map_rviz_has_nothing_to_show(looked_back, tmp_path):

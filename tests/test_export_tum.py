@@ -84,6 +84,15 @@ def test_files_are_named_by_their_trial(trial, with_seed, name):
     assert trial_name(trial, with_seed=with_seed) == name
 
 
+@pytest.mark.parametrize("name", ["../../amcl", "/tmp/amcl", "a/../b", "x" * 400])
+def test_no_name_leads_out_of_the_folder(name, tmp_path):
+    bundle, _, run = backward_stamps()
+    folder = tmp_path / "a" / "b"
+    folder.mkdir(parents=True)
+    write_tum(Request(bundle, [Run(Trial("id", name, 0), run.estimate)]), folder)
+    assert [p.parent for p in tmp_path.rglob("*.tum")] == [folder]
+
+
 def test_a_run_without_estimate_has_no_file_and_none_at_all_is_said():
     bundle, _, _ = backward_stamps()
     with pytest.raises(UsageError, match="no run has an estimate"):

@@ -35,13 +35,15 @@ from slamreplay.report.replay.ground import ground_of
 from slamreplay.report.replay.packing import as_text, packed, short_floats
 from slamreplay.report.replay.replay import replay_of
 from slamreplay.report.replay.tracks import Ticks, packed_track
+from slamreplay.report.replay.words import rows_left_out
 from slamreplay.testing.synthetic import START_NS, room_grid, synthetic_bundle, true_path
 from slamreplay.verdict.judgement import ConstantOffset, FailureMode, Interval, Judgement
 from slamreplay.verdict.limits import Limits
 
 S = 1_000_000_000
 N = 40
-HOSTILE = "</script><script>alert(1)</script> <!-- \" ' & \x00 \ud800"
+HOSTILE = "</script><script>alert(1)</script> <!-- \" ' & \x00 \ud800 \u202e"
+SHOWN = "</script><script>alert(1)</script> <!-- \" ' & \ufffd \ufffd [U+202E]"
 
 
 def unpacked(text):
@@ -421,11 +423,26 @@ def test_no_text_of_a_log_leaves_the_payload(post, page_of):
 
     assert data[0] == {"type": "application/octet-stream", "id": "replay-data"}
     assert re.fullmatch(r"[A-Za-z0-9+/=]+", data[1])
-    assert unpacked(data[1])[0]["marks"][1]["title"] == HOSTILE
+    assert unpacked(data[1])[0]["marks"][1]["title"] == SHOWN
     assert module[0] == {"type": "module"}
     assert "alert(1)" not in page
     assert parser.styled == []
     assert page_of(post) == page
+
+
+def test_a_text_of_a_log_is_no_longer_than_a_screen_shows(post):
+    long = replace(post.scene.marks[0], title="x" * 10_000)
+    replay = replay_of(replace(post, scene=replace(post.scene, marks=(long,))))
+
+    assert len(unpacked(replay.payload)[0]["marks"][0]["title"]) == 240
+
+
+@pytest.mark.parametrize(
+    ("n", "told"),
+    [(2, "2nd"), (3, "3rd"), (4, "4th"), (11, "11th"), (21, "21st"), (113, "113th")],
+)
+def test_numbers_are_told_in_order(n, told):
+    assert list(rows_left_out({"belief": n})) == [f"Every {told} pose of belief."]
 
 
 def test_every_script_is_in_the_page():

@@ -27,6 +27,9 @@ from slamreplay.geometry.covariance import planar_from_ros
 from slamreplay.geometry.times import NO_STAMP, Times
 from slamreplay.perturb import PERTURBATIONS
 
+#: Letters of a name that a file may have; most file systems hold 255 bytes with everything added.
+_MOST_LETTERS = 180
+
 
 @dataclass(frozen=True, eq=False)
 class Exported:
@@ -91,7 +94,8 @@ def runs_as_tum(bundle: Bundle, runs: Sequence[Run]) -> dict[str, Exported]:
         if run.estimate is None:
             continue
         track = run.estimate.track
-        name = _distinct(trial_name(run.trial, with_seed=len(seeds) > 1), run.trial.id, found)
+        stem = _file_stem(trial_name(run.trial, with_seed=len(seeds) > 1))
+        name = _distinct(stem, run.trial.id, found)
         found[name] = Exported(stamps(bundle, track.t_ns), track.t_ns, track.xyyaw, track.cov)
     if not found:
         raise UsageError("no run has an estimate", hint="'report' says why of each")
@@ -124,7 +128,7 @@ def bundle_as_tum(bundle: Bundle) -> dict[str, Exported]:
             continue  # sightings of many things are no trajectory
         yaw = se3.yaw_from_quaternion(rows["orientation_xyzw"])
         poses = np.column_stack([rows["position_xyz"][:, :2], yaw])
-        stem = "reference-" + re.sub(r"[^A-Za-z0-9_.]+", "_", topic).strip("_.")
+        stem = f"reference-{_file_stem(topic)}"
         at_ns = _or_clock(rows["t_sensor_ns"], rows.t_ns)
         cov = planar_from_ros(rows["covariance"])
         found[_distinct(stem, str(len(found)), found)] = Exported(at_ns, rows.t_ns, poses, cov)
@@ -160,6 +164,11 @@ def stamps(bundle: Bundle, t_ns: Times) -> Times:
 
 def _or_clock(stamp_ns: Times, t_ns: Times) -> Times:
     return np.where(stamp_ns == NO_STAMP, t_ns, stamp_ns)
+
+
+def _file_stem(name: str) -> str:
+    """A name that somebody else may have chosen as part of a file name: it leads nowhere else."""
+    return re.sub(r"[^A-Za-z0-9_.+-]+", "_", name).strip("_.")[:_MOST_LETTERS]
 
 
 def _distinct(stem: str, otherwise: str, taken: dict[str, Exported]) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from slamreplay.errors import UsageError
@@ -26,7 +26,6 @@ class Found:
     log: LogBundle
     runs: tuple[Run, ...] = ()
     design: DoseResults | None = None
-    options: dict[str, Any] = field(default_factory=dict)
 
 
 def found(evidence: Evidence, options: dict[str, Any], progress: Progress | bool | None) -> Found:

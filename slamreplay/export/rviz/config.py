@@ -10,8 +10,10 @@ from typing import Any
 
 import yaml
 
-#: Of the paths; blue and orange are told apart by colour-blind readers too.
-_COLOURS = {"belief": "230; 159; 0", "hindsight": "86; 180; 233"}
+from slamreplay.evidence import colours
+
+#: Of the paths.
+_COLOURS = {"belief": colours.BELIEF, "hindsight": colours.HINDSIGHT}
 _PIXELS = 900
 
 
@@ -79,7 +81,7 @@ def _path(name: str, topic: str) -> dict[str, Any]:
         "Alpha": 1.0,
         "Buffer Length": 1,
         "Class": "rviz_default_plugins/Path",
-        "Color": _COLOURS[name],
+        "Color": "; ".join(map(str, colours.rgb(_COLOURS[name]))),
         "Enabled": True,
         "Line Style": "Billboards",
         "Line Width": 0.05,

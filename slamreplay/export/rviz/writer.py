@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -31,15 +32,15 @@ Show all of it (start RViz first, for a player that has ended offers nothing any
 Or serve a map or an overlay by itself, here `{name}`:
 
   ros2 run nav2_map_server map_server --ros-args -r __node:={name}_shown \\
-    -p yaml_filename:=$PWD/{name}.yaml -p topic_name:=slamreplay/{name} -p frame_id:={frame}
+    -p yaml_filename:=$PWD/{name}.yaml -p topic_name:=slamreplay/{name} -p {frame}
   ros2 run nav2_util lifecycle_bringup {name}_shown
 """
 _WHAT = {
     "map": "the map that the log was judged in",
     "appeared": "cells where something stands that the map does not have: purple",
     "removed": "mapped walls that are gone: cyan",
-    "belief": "where the robot believed to be: orange",
-    "hindsight": "where it was: blue",
+    "belief": "where the robot believed to be: orange-red",
+    "hindsight": "where it was: light blue",
 }
 
 
@@ -78,7 +79,8 @@ def write_rviz(request: Request, folder: Path) -> None:
     (folder / "slamreplay.rviz").write_text(text, encoding="utf-8")
     what = "\n".join(f"  {topic}  {_WHAT[name]}" for name, topic in topics.items())
     name = "appeared" if "appeared" in grids else "map"
-    text = _README.format(log=LOG, what=what, name=name, frame=frame)
+    quoted = shlex.quote(f"frame_id:={frame}")  # a log's word, in a line to be copied to a shell
+    text = _README.format(log=LOG, what=what, name=name, frame=quoted)
     (folder / "README.txt").write_text(text, encoding="utf-8")
 
 

@@ -24,8 +24,9 @@ _ENTRIES = {
 }
 #: Axes of square matrices by their number of entries.
 _AXES = {9: ("x", "y", "z"), 36: ("x", "y", "z", "rx", "ry", "rz")}
-#: A spreadsheet computes a cell that begins so; an apostrophe before it makes it a text.
-_COMPUTED = ("=", "+", "-", "@")
+#: A spreadsheet computes a cell that begins so (OWASP, "CSV Injection"); an apostrophe before it
+#: makes it a text.
+_COMPUTED = ("=", "+", "-", "@", "\t", "\r", "\n")
 
 
 @dataclass(frozen=True, eq=False)

@@ -25,7 +25,8 @@ An empty cell is a number that is not known. Where a column of times has empty c
 dtype={"t_sensor_ns": "Int64"} to keep the digits. inf and -inf are ranges as recorded (REP-117).
 Vectors are columns _x _y _z (_w), covariances of poses columns _x_x to _rz_rz, row by row, order
 x y z rx ry rz, fixed axes of the frame. A list of numbers stands in one cell, with spaces between.
-A text that begins with = + - or @ has an apostrophe before it: a spreadsheet would compute it.
+A text that begins with = + - @, a tab or a line's end has an apostrophe before it: a spreadsheet
+would compute it.
 """
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from slamreplay.bundle.products import ChangedRegion
 from slamreplay.bundle.track import PoseTrack
+from slamreplay.evidence.clean import clean, straight
 from slamreplay.evidence.result import Postmortem
 from slamreplay.evidence.scene import Mark, Scene
 from slamreplay.evidence.words import STATES
@@ -23,6 +24,8 @@ from slamreplay.report.replay.tracks import HEADING_RAD, PLACE_M, Ticks
 _MARGIN_M, _WHOLE_UP_TO = 1.5, 1.7
 #: A map this much wider than tall needs less height, one this much taller than wide more.
 _WIDE, _TALL = 2.6, 1.2
+#: Letters of a text of the log that travel: no screen has room for more.
+_MOST_LETTERS = 240
 
 
 def head_of(
@@ -46,7 +49,7 @@ def head_of(
         "end_m": END_M,
         "point_m": POINT_M,
         "turn_rad": TURN_RAD,
-        "frame": (frames.odom or "odom") if odometry else (frames.map or "map"),
+        "frame": _text((frames.odom or "odom") if odometry else (frames.map or "map")),
         "tracks": list(tracks),
         "footprint": [_rounded(corner) for corner in scene.footprint_xy],
         "ground": None if ground is None else _ground(ground),
@@ -124,9 +127,15 @@ def _mark(post: Postmortem, mark: Mark) -> dict[str, object]:
         "kind": mark.kind,
         "t": _seconds(post, t_ns),
         "end": None if end_ns is None else _seconds(post, end_ns),
-        "title": mark.title,
+        "title": _text(mark.title),
         "severity": mark.severity,
     }
+
+
+def _text(text: str) -> str:
+    """A text of the log as the rest of the page has it: the payload is not cleaned with it."""
+    shown = straight(clean(text))
+    return shown if len(shown) <= _MOST_LETTERS else f"{shown[: _MOST_LETTERS - 3]}..."
 
 
 def _window(

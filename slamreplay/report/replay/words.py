@@ -82,4 +82,5 @@ def _ground(ground: Ground | None) -> Iterator[str]:
 
 
 def _nth(n: int) -> str:
-    return f"{n}th" if n > 3 else {1: "1st", 2: "2nd", 3: "3rd"}[n]
+    last = "th" if n % 100 in (11, 12, 13) else {1: "st", 2: "nd", 3: "rd"}.get(n % 10, "th")
+    return f"{n}{last}"
