@@ -48,16 +48,16 @@ _SMALL = """() => {
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_first_screen_is_the_verdict(show, reports, name):
-    page = show(name)
-    heading = page.get_by_role("heading", level=1)
+def test_first_screen_holds_verdict_map_and_three_facts(show, reports, name):
+    page = show(name, viewport={"width": 1280, "height": 720})
 
+    heading = page.get_by_role("heading", level=1)
     assert words(heading.inner_text()) == words(summary(reports, name))
-    box = heading.bounding_box()
-    assert box["y"] + box["height"] < 400
-    if name != "bare":
-        figure = page.locator("section.verdict figure img, section.verdict figure canvas").first
-        assert figure.bounding_box()["y"] < 800
+    picture, facts = page.locator("section.verdict figure img").first, page.locator(".facts li")
+    assert facts.count() == 3
+    for part in (heading, picture, *facts.all()):
+        box = part.bounding_box()
+        assert box["y"] + box["height"] <= 720
 
 
 @pytest.mark.parametrize("name", [*NAMES, "hostile"])
