@@ -102,7 +102,9 @@ def _fill(part: Part, axes: Axes) -> None:
 
     size = 8.0
     handles: list[Any] = part.draw(axes, size)
-    axes.legend(handles=handles, fontsize=size - 1.0, frameon=False, labelcolor=canvas.INK)
+    drawn = axes.legend(handles=handles, fontsize=size - 1.0, labelcolor=canvas.INK,
+                        facecolor="white", framealpha=0.85, edgecolor=canvas.RULE)  # fmt: skip
+    drawn.set_zorder(9.0)  # above what a map is drawn with
 
 
 def _flat(ax: Any) -> list[Axes]:
