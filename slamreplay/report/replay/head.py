@@ -65,7 +65,7 @@ def head_of(
             for one in scene.lanes
         ],
         "window": _window(tracks, regions, ground),
-        "open_s": _opens(post, tracks),
+        "open_s": _opens(post, scene, tracks),
     }
 
 
@@ -160,8 +160,11 @@ def _window(
     return _rounded(np.concatenate([low, high]))
 
 
-def _opens(post: Postmortem, tracks: Mapping[str, PoseTrack]) -> float:
-    """When the replay opens: the belief most wrong while lost, the first change, or the start."""
+def _opens(post: Postmortem, scene: Scene, tracks: Mapping[str, PoseTrack]) -> float:
+    """When the replay opens: the belief most wrong while lost, the first change, or the start.
+
+    A moment with something to see: with every path known, and a scan.
+    """
     since, error = post.drawn_from_ns, post.error
     if error is not None:
         lost = np.zeros(len(error.t_ns), dtype=bool)
@@ -173,6 +176,17 @@ def _opens(post: Postmortem, tracks: Mapping[str, PoseTrack]) -> float:
             return _seconds(post, int(error.t_ns[np.nanargmax(shown)]))
     for i in post.judgement.intervals:
         if i.is_changed and i.end_ns > since:
-            return _seconds(post, max(i.start_ns, since))
+            return _seconds(post, min(max(i.start_ns, since, _seen_from(scene, tracks)), i.end_ns))
+    return max(_seconds(post, _seen_from(scene, tracks)), 0.0) if tracks else 0.0
+
+
+def _seen_from(scene: Scene, tracks: Mapping[str, PoseTrack]) -> int:
+    """When every path is known, and the first scan after it; when one is, without any scan."""
     first = [int(track.t_ns[track.has_pose][0]) for track in tracks.values()]
-    return max(_seconds(post, min(first)), 0.0) if first else 0.0
+    if not first:
+        return 0
+    for t_ns in (scans.t_ns for scans in scene.scans):
+        after = t_ns[t_ns >= max(first)]
+        if len(after):
+            return int(after[0])
+    return min(first)
