@@ -62,6 +62,12 @@ def test_missing_argument_is_a_usage_error():
     assert "hint: see slamreplay report --help" in says_one_line(run("report", "-o", "out"))
 
 
+def test_a_choice_that_is_none_is_named_without_the_parsers_own_words():
+    said = says_one_line(run("export", "x", "--to", "foo", "-o", "out"))
+
+    assert "'--to': 'foo' is not one of 'tum'" in said
+
+
 def test_bare_call_shows_the_help():
     assert "Usage" in run().stdout
 

@@ -126,6 +126,20 @@ def test_covariances_are_openvins_and_read_back_as_a_reference(tmp_path):
     np.testing.assert_allclose(back, want, atol=1e-9)
 
 
+def test_covariances_that_nobody_knows_are_told(bundle, tmp_path):
+    ran = call("export", bundle, "--to", "tum", "--covariance", "-o", tmp_path / "T")
+    assert ran.exit_code == 0, ran.output
+
+    head = json.loads((tmp_path / "T" / "export.json").read_text())
+    for told in head["not_as_recorded"]:
+        stem = told["what"].removeprefix("covariances of ")
+        assert f"{stem}.tum" in head["files"]
+        assert f"{stem}.openvins.txt" not in head["files"]
+    written = [n for n in head["files"] if n.endswith(".openvins.txt")]
+    trajectories = [n for n in head["files"] if n.endswith(".tum")]
+    assert len(written) + len(head["not_as_recorded"]) == len(trajectories)
+
+
 def test_a_window_leaves_lines_out(bundle, tmp_path):
     ran = call("export", bundle, "--to", "tum", "-o", tmp_path / "T", "--start", 1, "--end", 2)
     assert ran.exit_code == 0, ran.output

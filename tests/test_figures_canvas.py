@@ -3,9 +3,19 @@
 import io
 
 import numpy as np
+import pytest
+from matplotlib.lines import Line2D
 from PIL import Image
 
-from slamreplay.report.figures.canvas import new_figure, plain_style, png_bytes, svg_bytes
+from slamreplay.report.figures.canvas import (
+    BESIDE,
+    dress,
+    new_figure,
+    plain_style,
+    png_bytes,
+    svg_bytes,
+)
+from slamreplay.report.figures.fitted import fit_plane
 
 
 def drawn():
@@ -38,3 +48,21 @@ def test_png_is_a_picture_of_the_size_asked_for():
 
     assert once == again
     assert Image.open(io.BytesIO(once)).size == (300, 150)
+
+
+@pytest.mark.parametrize("height", [0.7, 1.06, 1.3, 2.0])
+def test_labels_of_a_plane_that_was_cut_to_fit_stay_on_the_paper(height):
+    with plain_style():
+        figure = new_figure(BESIDE, BESIDE)
+        axes = figure.add_subplot()
+        dress(axes, "x in map [m]", "y in map [m]", 9.5)
+        axes.set(aspect="equal", xlim=(-3.1, 7.7), ylim=(-4.3, -4.3 + 10.8 * height))
+        handles = [Line2D([], [], label="stands there, not mapped") for _ in range(5)]
+        fit_plane(figure, height, handles, BESIDE)
+        svg_bytes(figure)
+        boxes = [part.get_window_extent() for part in (axes.xaxis.label, axes.yaxis.label)]
+
+    spare = 2.0  # a text's box is larger than its ink, px
+    for box in boxes:
+        assert -spare <= box.x0 < box.x1 <= figure.bbox.width + spare
+        assert -spare <= box.y0 < box.y1 <= figure.bbox.height + spare

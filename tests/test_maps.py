@@ -87,6 +87,15 @@ def test_bad_map_yamls_are_named(tmp_path, text, says):
     assert "\n" not in str(caught.value)
 
 
+def test_an_image_in_the_yamls_place_is_said(tmp_path):
+    (tmp_path / "m.pgm").write_bytes(b"P5\n1 1\n255\n\xcd")
+
+    with pytest.raises(MapError, match="it is no text") as caught:
+        read_map(tmp_path / "m.pgm", warn=quiet)
+
+    assert "give the yaml" in str(caught.value)
+
+
 def test_image_that_is_no_image(tmp_path):
     (tmp_path / "m.pgm").write_text("P5 nonsense")
     (tmp_path / "m.yaml").write_text(f"image: m.pgm\n{HEAD}")

@@ -289,8 +289,23 @@ def opens(post, states):
 def test_opens_at_what_matters(post):
     assert opens(post, ["healthy", "map_changed", "lost"]) == pytest.approx(3.0, abs=0.5)
     assert 1.0 <= opens(post, ["healthy", "lost", "insufficient_data"]) < 2.0
-    assert opens(post, ["healthy", "map_changed", "insufficient_data"]) == 1.0
+    assert opens(post, ["healthy", "map_changed", "insufficient_data"]) == pytest.approx(1.9)
     assert opens(post, ["healthy", "healthy", "healthy"]) == 0.0
+
+
+def test_opens_where_there_is_something_to_see(post):
+    xyyaw = post.belief.xyyaw.copy()
+    xyyaw[:5] = np.nan
+    late = track(post.belief.t_ns, xyyaw)
+    judgement = replace(
+        post.judgement, intervals=(Interval("map_changed", START_NS, START_NS + 4 * S),)
+    )
+    shown = replace(post, belief=late, judgement=judgement)
+
+    opened = unpacked(replay_of(shown).payload)[0]["open_s"]
+
+    assert opened >= 0.5
+    assert opened * S + START_NS in post.scene.scans[0].t_ns
 
 
 def test_same_log_same_bytes(post):
@@ -462,3 +477,12 @@ def test_the_policy_lets_that_one_script_run(post, page_of):
     assert f"script-src 'sha256-{digest}'" in policy
     assert "unsafe" not in policy
     assert not re.search(r"\beval\b|new Function|innerHTML|outerHTML|insertAdjacentHTML", script)
+
+
+def test_without_scans_none_are_promised(post):
+    bare = replace(post, scene=replace(post.scene, scans=()))
+    alone = replace(bare, belief=None, hindsight=None, odometry=post.belief)
+
+    assert "scan" in replay_of(post).lead
+    assert "scan" not in replay_of(bare).lead
+    assert replay_of(alone).lead == "The path by odometry alone."

@@ -67,6 +67,24 @@ def test_the_three_facts_are_the_pages(post, lines):
         assert (line.tone == "bad") == fact.alarming
 
 
+def test_facts_without_a_number_are_told_by_what_is_lacking(post, lines):
+    bare = lines(belief=None, hindsight=None)
+    nowhere = lines(hindsight=replace(post.hindsight, coverage=0.0, sigma_m=float("nan")))
+
+    assert bare["belief"].text.startswith("no belief: no localizer spoke")
+    assert bare["hindsight"].text.startswith("none: it needs ")
+    assert nowhere["hindsight"].text == "unknown: 0 % of the scans have a place in the map"
+
+
+def test_without_a_belief_no_state_says_that_it_was_right(post, lines):
+    for state in STATES:
+        judgement = replace(post.judgement, state=state)
+        told = lines(judgement=judgement, belief=None)[state].text
+
+        assert "knew where" not in told
+        assert "was right" not in told
+
+
 @pytest.mark.parametrize("state", STATES)
 def test_every_state_has_its_words(post, lines, state):
     first = next(iter(lines(judgement=replace(post.judgement, state=state)).values()))

@@ -73,7 +73,7 @@ def run() -> int:
         return int(app(sys.argv[1:] or ["--help"], standalone_mode=False) or 0)
     except _UsageFault as error:
         where = error.ctx.command_path if getattr(error, "ctx", None) else "slamreplay"
-        message = " ".join(error.format_message().split()).rstrip(".")
+        message = " ".join(error.format_message().split()).rstrip(".").replace("Value error, ", "")
         complain(f"slamreplay: {message} (hint: see {where} --help)")
         return EXIT_INPUT
     except (typer.Abort, KeyboardInterrupt):

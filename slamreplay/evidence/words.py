@@ -25,6 +25,11 @@ STATES = {
     ),
     "insufficient_data": StateWords("Cannot be judged", "the log lacks what the question needs"),
 }
+#: Of states that say something of the belief, where none was recorded.
+_WITHOUT_BELIEF = {
+    "healthy": "the map held; no belief to judge",
+    "map_changed": "the map no longer held; no belief to judge",
+}
 
 FAILURE_MODES = {
     "sensing_ambiguity": "sensing ambiguity",
@@ -39,3 +44,14 @@ FAILURE_MODES = {
     "wrong_map": "wrong map or map frame",
     "none": "none",
 }
+
+
+def meaning_of(state: str, *, has_belief: bool) -> str:
+    """What a state says; without a belief nothing is said of one.
+
+    Args:
+        state: a key of STATES.
+        has_belief: whether a localizer spoke in the log.
+    """
+    meaning = STATES[state].meaning
+    return meaning if has_belief else _WITHOUT_BELIEF.get(state, meaning)

@@ -21,6 +21,7 @@ from slamreplay.bundle.schema import TABLES
 from slamreplay.bundle.tum import openvins_lines, tum_lines
 from slamreplay.bundle.view import Bundle
 from slamreplay.errors import UsageError
+from slamreplay.export.formats import NotAsRecorded
 from slamreplay.export.request import Request
 from slamreplay.geometry import se2, se3
 from slamreplay.geometry.covariance import planar_from_ros
@@ -63,8 +64,11 @@ class Exported:
         return openvins_lines(self.stamps_ns[keep], self.xyyaw[keep], self.cov[keep])
 
 
-def write_tum(request: Request, folder: Path) -> None:
+def write_tum(request: Request, folder: Path) -> list[NotAsRecorded]:
     """NAME.tum of every trajectory; NAME.openvins.txt of those with covariances, where asked.
+
+    Returns:
+        Trajectories of which covariances were asked for and there are none.
 
     Raises:
         UsageError: there is no trajectory.
@@ -72,11 +76,16 @@ def write_tum(request: Request, folder: Path) -> None:
     found = (
         runs_as_tum(request.bundle, request.runs) if request.runs else bundle_as_tum(request.bundle)
     )
+    missed = []
     for stem, one in found.items():
         (folder / f"{stem}.tum").write_text(one.lines(request.holds), encoding="utf-8")
         if request.covariance and one.has_covariance:
             text = one.openvins(request.holds)
             (folder / f"{stem}.openvins.txt").write_text(text, encoding="utf-8")
+        elif request.covariance:
+            poses = int(np.isfinite(one.xyyaw).all(axis=1).sum())
+            missed.append(NotAsRecorded(f"covariances of {stem}", poses, "none are known"))
+    return missed
 
 
 def runs_as_tum(bundle: Bundle, runs: Sequence[Run]) -> dict[str, Exported]:

@@ -59,8 +59,7 @@ def _head(
 def _tum(request: Request, folder: Path) -> Sequence[NotAsRecorded]:
     from slamreplay.export.tum import write_tum
 
-    write_tum(request, folder)
-    return ()
+    return write_tum(request, folder)
 
 
 def _csv(request: Request, folder: Path) -> Sequence[NotAsRecorded]:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from slamreplay.bundle.manifest import Clock, Frames, Loss
 from slamreplay.errors import LogError, UsageError
-from slamreplay.geometry.times import ns
+from slamreplay.geometry.times import NS_PER_S, ns
 from slamreplay.ingest.assembly import Assembly
 
 #: Tables whose latest row before the start still holds after it.
@@ -63,9 +63,11 @@ def cut(
     start = span[0] + ns(start_s or 0.0)
     end = span[1] if end_s is None else min(span[1], span[0] + ns(end_s))
     if not start < end:
+        length_s = (span[1] - span[0]) / NS_PER_S
         raise UsageError(
-            f"nothing is left between --start {start_s or 0:g} and --end {end_s or 0:g}",
-            hint=f"the log lasts {(span[1] - span[0]) / 1e9:.1f} s",
+            f"nothing is left between --start {start_s or 0:g} and "
+            f"--end {length_s if end_s is None else end_s:g}",
+            hint=f"the log lasts {length_s:.1f} s",
         )
     parts = {name: _part(table, start, end) for name, table in tables.items()}
     return parts | _costmaps_part(tables, start, end), (start, end)

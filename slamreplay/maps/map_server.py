@@ -97,7 +97,10 @@ def _read_meta(yaml_path: Path) -> dict[str, Any]:
         meta = yaml.safe_load(yaml_path.read_text(encoding="utf-8"))
     except FileNotFoundError as error:
         raise MapError("no such map yaml", where=yaml_path) from error
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
+    except UnicodeDecodeError as error:
+        hint = "of a map give the yaml, which names the image"
+        raise MapError("not a map yaml: it is no text", where=yaml_path, hint=hint) from error
+    except (OSError, yaml.YAMLError) as error:
         problem = str(error).splitlines()[0]
         raise MapError(f"not a map yaml: {problem}", where=yaml_path) from error
     if not isinstance(meta, dict):

@@ -15,13 +15,21 @@ from slamreplay.verdict.words import square_metres
 
 @dataclass(frozen=True)
 class Fact:
-    """One number, what it is, what to hold it against, and where the replay shows it."""
+    """One number, what it is, what to hold it against, and where the replay shows it.
+
+    Where there is no number a word stands in its place.
+    """
 
     number: str
     label: str
     detail: str
     alarming: bool = False
     link: str = ""
+
+    @property
+    def is_known(self) -> bool:
+        """Whether there is a number."""
+        return any(character.isdigit() for character in self.number)
 
 
 def deciding_facts(post: Postmortem) -> tuple[Fact, Fact, Fact]:
@@ -74,7 +82,7 @@ def _map(post: Postmortem) -> Fact:
         else (f"{count} changed region{'s' if count > 1 else ''}, {square_metres(area)} in all")
     )
     detail = (
-        f"Half of all scans stay under {100 * np.nanmedian(changes.changed_share):.1f} %. "
+        f"In half of all scans at most {100 * np.nanmedian(changes.changed_share):.1f} %. "
         f"Changed for {changed_s:.1f} s in all (over {100 * limits.changed_share:g} % for "
         f"{limits.changed_s:g} s); {regions}."
     )
@@ -91,7 +99,9 @@ def _hindsight(post: Postmortem) -> Fact:
         lacks = "a map" if post.grid is None else "scans"
         return Fact("none", label, f"It needs {lacks}, which this log does not have.")
     detail = f"{100 * hindsight.coverage:.0f} % of the scans have a place in the map"
-    if hindsight.margin is None:
+    if not hindsight.coverage:
+        detail += "."
+    elif hindsight.margin is None:
         detail += "; no other place explains them as well."
     else:
         detail += (

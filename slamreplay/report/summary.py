@@ -8,7 +8,7 @@ from typing import Literal
 
 from slamreplay.bundle.findings import SEVERITIES
 from slamreplay.evidence.result import Postmortem
-from slamreplay.evidence.words import FAILURE_MODES, STATES
+from slamreplay.evidence.words import FAILURE_MODES, STATES, meaning_of
 from slamreplay.geometry.times import NS_PER_S
 from slamreplay.report.assess import title_of
 from slamreplay.report.facts import Fact, deciding_facts
@@ -49,7 +49,7 @@ def summary_lines(post: Postmortem) -> tuple[SummaryLine, ...]:
     this order, whatever the log.
     """
     judgement = post.judgement
-    meaning, sure = STATES[judgement.state].meaning, ""
+    meaning, sure = meaning_of(judgement.state, has_belief=post.belief is not None), ""
     if judgement.confidence is not None:
         sure = f", confidence {percent(judgement.confidence)}"
     tone = _STATE_TONES[judgement.state]
@@ -74,8 +74,10 @@ def summary_text(post: Postmortem) -> str:
 
 
 def _fact(label: str, fact: Fact) -> SummaryLine:
-    """The number, and of its explanation the first sentence."""
+    """The number, and of its explanation the first sentence; that alone where there is none."""
     first = fact.detail.partition(". ")[0].rstrip(".")
+    if not fact.is_known:
+        return SummaryLine(label, f"{fact.number}: {first[:1].lower()}{first[1:]}", "doubt")
     text = f"{fact.number} {fact.label}; {first[:1].lower()}{first[1:]}"
     return SummaryLine(label, text, "bad" if fact.alarming else "plain")
 

@@ -9,6 +9,12 @@ from slamreplay.bundle.track import PoseTrack
 from slamreplay.bundle.view import BundleView
 from slamreplay.verdict.timing import Delay
 
+#: By whether particles were recorded.
+_NO_COVARIANCE = {
+    False: "no covariance: whether it knew how unsure it was cannot be told",
+    True: "no covariance: how unsure it was is told by its particles alone",
+}
+
 
 def lacking(
     view: BundleView,
@@ -26,7 +32,8 @@ def lacking(
     if belief is None:
         found.append("no belief: whether the robot was lost is not judged")
     elif not np.isfinite(belief.cov[:, :2, :2]).any():
-        found.append("no covariance: whether it knew how unsure it was cannot be told")
+        by_cloud = manifest.topic_of("particles") is not None
+        found.append(_NO_COVARIANCE[by_cloud])
     if manifest.topic_of("odometry") is None and manifest.frames.odom is None:
         found.append("no odometry: slip and being carried cannot be told apart")
     if hindsight is not None and len(hindsight.track) and hindsight.margin is None:

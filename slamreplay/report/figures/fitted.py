@@ -23,6 +23,15 @@ def fit_plane(figure: Figure, aspect: float, handles: Sequence[object], width_in
         handles: of the legend.
         width_in: of the paper; narrow paper has the legend below in any case.
     """
+    _set_size(figure, aspect, handles, width_in)
+    # Ticks change as equal axes shrink into their box: laid out once, the ordinate's label is cut.
+    engine = figure.get_layout_engine()
+    if engine is not None:
+        engine.execute(figure)
+        engine.execute(figure)
+
+
+def _set_size(figure: Figure, aspect: float, handles: Sequence[object], width_in: float) -> None:
     size = canvas.text_size(width_in)
     columns = 2 if width_in < 5.0 else 4
     lines = _LINE * size / 9.5 * -(-len(handles) // columns)

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from slamreplay.bundle.products import ChangedRegion
 from slamreplay.bundle.track import PoseTrack
@@ -19,6 +20,7 @@ from slamreplay.report.replay.beams import END_M
 from slamreplay.report.replay.ground import OCCUPIED, Ground
 from slamreplay.report.replay.overlays import POINT_M, TURN_RAD
 from slamreplay.report.replay.tracks import HEADING_RAD, PLACE_M, Ticks
+from slamreplay.verdict.judgement import Interval
 
 #: Around what is shown, m; a map up to this many times larger than the paths is shown whole.
 _MARGIN_M, _WHOLE_UP_TO = 1.5, 1.7
@@ -65,7 +67,7 @@ def head_of(
             for one in scene.lanes
         ],
         "window": _window(tracks, regions, ground),
-        "open_s": _opens(post, tracks),
+        "open_s": _opens(post, scene, tracks),
     }
 
 
@@ -160,19 +162,46 @@ def _window(
     return _rounded(np.concatenate([low, high]))
 
 
-def _opens(post: Postmortem, tracks: Mapping[str, PoseTrack]) -> float:
-    """When the replay opens: the belief most wrong while lost, the first change, or the start."""
+def _opens(post: Postmortem, scene: Scene, tracks: Mapping[str, PoseTrack]) -> float:
+    """When the replay opens: the belief or the map most wrong while it was, or the start.
+
+    A moment with something to see: with every path known, and a scan.
+    """
+    if not tracks:
+        return 0.0
     since, error = post.drawn_from_ns, post.error
-    if error is not None:
-        lost = np.zeros(len(error.t_ns), dtype=bool)
-        for i in post.judgement.intervals:  # elsewhere nobody vouches for the distance
-            if i.is_lost:
-                lost |= (error.t_ns >= max(i.start_ns, since)) & (error.t_ns < i.end_ns)
-        shown = np.where(lost, error.distance_m, np.nan)
-        if np.isfinite(shown).any():
-            return _seconds(post, int(error.t_ns[np.nanargmax(shown)]))
-    for i in post.judgement.intervals:
-        if i.is_changed and i.end_ns > since:
-            return _seconds(post, max(i.start_ns, since))
+    intervals = post.judgement.intervals
+    if error is not None:  # elsewhere than while it was lost nobody vouches for the distance
+        lost = [i for i in intervals if i.is_lost]
+        worst = _worst(error.t_ns, error.distance_m, lost, since)
+        if worst is not None:
+            return _seconds(post, worst)
+    seen_from = max(since, _seen_from(scene, tracks))
+    changes = None if post.hindsight is None else post.hindsight.changes
+    if changes is not None:
+        changed = [i for i in intervals if i.is_changed]
+        worst = _worst(changes.t_ns, changes.changed_share, changed, seen_from)
+        if worst is not None:
+            return _seconds(post, worst)
+    return max(_seconds(post, seen_from), 0.0)
+
+
+def _worst(
+    t_ns: NDArray[np.int64], values: se2.Array, stretches: Sequence[Interval], since_ns: int
+) -> int | None:
+    """When a value was the greatest within some stretches; None where it is not known in any."""
+    within = np.zeros(len(t_ns), dtype=bool)
+    for i in stretches:
+        within |= (t_ns >= max(i.start_ns, since_ns)) & (t_ns < i.end_ns)
+    shown = np.where(within, values, np.nan)
+    return int(t_ns[np.nanargmax(shown)]) if np.isfinite(shown).any() else None
+
+
+def _seen_from(scene: Scene, tracks: Mapping[str, PoseTrack]) -> int:
+    """When every path is known, at the first scan after it; when one is, without any scan."""
     first = [int(track.t_ns[track.has_pose][0]) for track in tracks.values()]
-    return max(_seconds(post, min(first)), 0.0) if first else 0.0
+    for t_ns in (scans.t_ns for scans in scene.scans):
+        after = t_ns[t_ns >= max(first)]
+        if len(after):
+            return int(after[0])
+    return min(first)

@@ -95,7 +95,7 @@ def replay_of(post: Postmortem, budget: int = BUDGET_BYTES) -> Replay | None:
     notes = words.notes(post, scans=[one for _, one in scans], overlays=overlays, ground=ground)
     return Replay(
         as_text(packed(told, arrays)),
-        words.lead(tracks),
+        words.lead(tracks, has_scans=bool(scans)),
         (*notes, *words.rows_left_out(every)),
         len({mark.kind for mark in scene.marks}),
         len(scene.lanes),

@@ -22,14 +22,16 @@ def notes(
     return (*_places(post), *_scans(post, scans), *_overlays(overlays), *_ground(ground))
 
 
-def lead(tracks: Collection[str]) -> str:
+def lead(tracks: Collection[str], *, has_scans: bool) -> str:
     """What is to be seen, in one sentence, by the paths that are known."""
     if "odometry" in tracks:
-        return "The path by odometry alone, and each scan laid where that leads."
+        scans = ", and each scan laid where that leads" if has_scans else ""
+        return f"The path by odometry alone{scans}."
     if len(tracks) == 2:
+        scans = ", with the scan laid at both. A scan that fits the walls is in its place"
         return (
             "Each moment twice: dashed, where the robot believed to be, and solid, where it really "
-            "was, with the scan laid at both. A scan that fits the walls is in its place."
+            f"was{scans if has_scans else ''}."
         )
     if "belief" in tracks:
         return "Each moment as the robot believed it; where it really was is not known."
