@@ -9,6 +9,7 @@ from slamreplay.evidence.clean import clean
 from slamreplay.evidence.scene import MarkKind
 from slamreplay.evidence.words import FAILURE_MODES, STATES
 from slamreplay.export.shown import Shown
+from slamreplay.version import __version__
 
 #: Marks of these kinds are told as states, stops or findings already.
 _TOLD: tuple[MarkKind, ...] = ("lost", "map_changed", "stop", "finding")
@@ -45,8 +46,6 @@ def notes(shown: Shown) -> list[Note]:
 
 def verdict_facts(shown: Shown) -> dict[str, str]:
     """The verdict and what it is of, by name."""
-    from slamreplay import __version__
-
     judgement = shown.post.judgement
     confidence = judgement.confidence
     return {

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from slamreplay import __version__
 from slamreplay.evidence.result import Postmortem
 from slamreplay.evidence.words import FAILURE_MODES, STATES, StateWords
 from slamreplay.report import (
@@ -26,6 +25,7 @@ from slamreplay.report.latency import latency_note, usage_table
 from slamreplay.report.phrases import percent, seconds
 from slamreplay.report.summary import summary_text
 from slamreplay.report.timeline import HATCHES, Band, bands, marks, timeline_alt
+from slamreplay.version import __version__
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from slamreplay import __version__
 from slamreplay.consistency.belief.summary import PartSummary
 from slamreplay.evidence.clean import clean
 from slamreplay.evidence.result import Postmortem
@@ -15,6 +14,7 @@ from slamreplay.report.dose_tables import level_text, panel_of
 from slamreplay.report.figures.doses import response_label
 from slamreplay.report.figures.map import NAMED
 from slamreplay.report.phrases import graph_alt, map_note, percent, reference_note, seconds, short
+from slamreplay.version import __version__
 
 #: So many curves of a design are told in numbers; the report has them all.
 _CURVES = 6
