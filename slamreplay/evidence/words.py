@@ -39,3 +39,8 @@ FAILURE_MODES = {
     "wrong_map": "wrong map or map frame",
     "none": "none",
 }
+
+
+def confidence_text(confidence: float | None) -> str:
+    """A probability in per cent; 100 % would claim more than any evidence gives."""
+    return "not known" if confidence is None else f"{min(100.0 * confidence, 99.0):.0f} %"
