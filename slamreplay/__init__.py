@@ -13,7 +13,7 @@ In a notebook or a script, `import slamreplay as sr`, then:
 
 from typing import TYPE_CHECKING
 
-__version__ = "0.1.0"
+from slamreplay.version import __version__ as __version__
 
 if TYPE_CHECKING:
     from slamreplay.errors import SlamreplayError as SlamreplayError

@@ -10,8 +10,6 @@ import os
 import tempfile
 from pathlib import Path
 
-import slamreplay
-
 #: numba's own variable.
 VARIABLE = "NUMBA_CACHE_DIR"
 
@@ -23,7 +21,7 @@ def keep_kernels(caches: Path) -> None:
         caches: folder of the program's caches, made where that is allowed. Else kernels go to a
             folder in the temporary one, which must be the user's own: what lies in it is run.
     """
-    if VARIABLE in os.environ or os.access(Path(slamreplay.__file__).parent, os.W_OK):
+    if VARIABLE in os.environ or os.access(Path(__file__).parent, os.W_OK):
         return
     user = os.getuid() if hasattr(os, "getuid") else 0
     for folder in (caches, Path(tempfile.gettempdir()) / f"slamreplay-{user}"):

@@ -264,7 +264,7 @@ def test_findings_are_lines_of_a_log(found, read):
     lines = [(t, m.level, m.name, m.message) for t, m in read["findings"]]
     lost_ns, start_ns = START_NS + LOST_FROM * S // 10, found[1].manifest.start_ns
 
-    words = "Robot lost (confidence 98%): The robot was lost for 2 s."
+    words = "Robot lost (confidence 98 %): The robot was lost for 2 s."
     assert lines[0] == (start_ns, Log.ERROR, "verdict", words)
     assert (start_ns, Log.WARNING, "SR-DAT-002", "of the whole log") in lines
     assert (lost_ns, Log.ERROR, "SR-LOC-001", "off by 1.5 m") in lines
@@ -352,13 +352,12 @@ def test_a_window_cuts_what_is_written(found, tmp_path):
     assert "jump" not in names
 
 
-def test_names_are_taken_out_of_texts(found, tmp_path):
-    read = written(found, tmp_path, redact=lambda text: text.replace("lost", "[name]"))
-    texts = [m.message for _, m in read["findings"]]
-    ((_, verdict),) = read["verdict"]
-    causes = [kv.value for e in read["stops"][-1][1].entities for kv in e.metadata]
+def test_no_verdict_is_told_to_be_certain(found, tmp_path):
+    bundle, post, runs = found
+    sure = replace(post, judgement=replace(post.judgement, confidence=1.0))
+    read = written((bundle, sure, runs), tmp_path)
 
-    assert not [t for t in (*texts, verdict.summary, *causes) if "was lost" in t]
+    assert read["findings"][0][1].message.startswith("Robot lost (confidence 99 %)")
 
 
 def test_a_log_without_much_is_written_too(found, tmp_path):

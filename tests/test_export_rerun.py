@@ -1,6 +1,5 @@
 """What was found, as a recording of Rerun's, read back by Rerun's own library."""
 
-import importlib.util
 from collections import defaultdict
 from dataclasses import replace
 
@@ -10,6 +9,8 @@ from exported import LOST_FROM, SILENT, N, S, exported
 
 from slamreplay.errors import UsageError
 from slamreplay.evidence import colours
+from slamreplay.export import formats
+from slamreplay.export.formats import Format, needs
 from slamreplay.export.rerun import write_rerun
 from slamreplay.geometry import se2
 from slamreplay.testing.synthetic import START_NS
@@ -200,11 +201,9 @@ def test_a_log_without_much_is_written_too(found, tmp_path):
     assert written((bundle, bare, ()), tmp_path)["/state", "StateChange:state"]
 
 
-def test_without_the_library_it_says_so_in_one_line(found, tmp_path, monkeypatch):
-    bundle, post, _ = found
-    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
+def test_without_the_library_it_says_so_in_one_line(monkeypatch):
+    monkeypatch.setattr(formats, "find_spec", lambda name: None)
 
     with pytest.raises(UsageError, match="not installed") as error:
-        write_rerun(post, bundle.view(), tmp_path)
+        needs(Format.RERUN, None)
     assert "slamreplay[rerun]" in str(error.value.hint)
-    assert not list(tmp_path.iterdir())

@@ -17,6 +17,7 @@ from slamreplay.audit.log_audit import LogAudit
 from slamreplay.bundle.findings import Finding
 from slamreplay.consistency.audits.inspection import clock_and_frames
 from slamreplay.evidence.scene import Scene
+from slamreplay.evidence.words import confidence_text
 from slamreplay.ingest.pipeline import ingest
 from slamreplay.postmortem import postmortem
 from slamreplay.report.audit_tables import edges, streams
@@ -25,6 +26,7 @@ from slamreplay.report.figures.neutral import DARK_PAPER, dark_of
 from slamreplay.report.finding_rows import MOST_FINDINGS
 from slamreplay.report.html import html
 from slamreplay.report.moments import moment_link
+from slamreplay.report.phrases import percent
 from slamreplay.report.print_style import print_style
 from slamreplay.testing.synthetic import START_NS, synthetic_bundle
 
@@ -185,6 +187,11 @@ def test_nothing_on_the_page_runs_loads_or_styles_inline(pages):
             digest = base64.b64encode(hashlib.sha256(style.encode()).digest()).decode()
             assert f"'sha256-{digest}'" in policy
             assert not re.search(r"@import|https?:|url\((?!#)", style)
+
+
+def test_what_was_counted_may_be_all_of_it_and_no_belief_is_certain():
+    assert (percent(1.0), confidence_text(1.0)) == ("100 %", "99 %")
+    assert confidence_text(None) == "not known"
 
 
 def test_page_of_a_short_log_is_light(pages):

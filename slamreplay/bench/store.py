@@ -10,7 +10,6 @@ from pathlib import Path
 
 import numpy as np
 
-import slamreplay
 from slamreplay.bench.measure import Measured
 from slamreplay.bench.schedule import Case
 from slamreplay.bundle.atomic import write_file
@@ -21,7 +20,7 @@ _NOT_MEASURED = ("cli", "report", "export", "testing")
 
 def fingerprint() -> str:
     """Of the package's own source: a log judged by other code is judged again."""
-    root = Path(slamreplay.__file__).parent
+    root = Path(__file__).parents[1]
     digest = hashlib.sha256()
     for path in sorted(root.rglob("*.py")):
         name = path.relative_to(root)

@@ -6,13 +6,11 @@ import hashlib
 from functools import cache
 from pathlib import Path
 
-import slamreplay
-
 
 @cache
 def code_hash(*packages: str) -> str:
     """Hash of the source of some packages of this program, or of all of it."""
-    root = Path(slamreplay.__file__).parent
+    root = Path(__file__).parents[1]
     places = [root / name for name in packages] or [root]
     digest = hashlib.sha256()
     for file in sorted(file for place in places for file in place.rglob("*.py")):

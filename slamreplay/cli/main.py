@@ -13,11 +13,11 @@ from typing import Annotated, Any
 
 import typer
 
-from slamreplay import __version__
 from slamreplay.caches import cache_folder
 from slamreplay.cli.terminal import complain, settle_streams
 from slamreplay.errors import SlamreplayError
 from slamreplay.kernel_cache import keep_kernels
+from slamreplay.version import __version__
 
 #: Exit codes of design: 1 is raised by the commands that were asked to judge (`--fail-on`).
 EXIT_INPUT, EXIT_FAULT, EXIT_INTERRUPTED = 2, 70, 130

@@ -55,3 +55,8 @@ def meaning_of(state: str, *, has_belief: bool) -> str:
     """
     meaning = STATES[state].meaning
     return meaning if has_belief else _WITHOUT_BELIEF.get(state, meaning)
+
+
+def confidence_text(confidence: float | None) -> str:
+    """A probability in per cent; 100 % would claim more than any evidence gives."""
+    return "not known" if confidence is None else f"{min(100.0 * confidence, 99.0):.0f} %"

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from slamreplay.bundle.findings import Severity
 from slamreplay.evidence.clean import clean
 from slamreplay.evidence.scene import MarkKind
-from slamreplay.evidence.words import FAILURE_MODES, STATES
+from slamreplay.evidence.words import FAILURE_MODES, STATES, confidence_text
 from slamreplay.export.shown import Shown
+from slamreplay.version import __version__
 
 #: Marks of these kinds are told as states, stops or findings already.
 _TOLD: tuple[MarkKind, ...] = ("lost", "map_changed", "stop", "finding")
@@ -40,13 +41,11 @@ def notes(shown: Shown) -> list[Note]:
     found += [Note(m.t_ns, m.severity, m.kind, m.title) for m in marks if m.kind not in _TOLD]
     kept = [note for note in found if shown.has(note.t_ns)]
     kept.sort(key=lambda note: note.t_ns)
-    return [Note(n.t_ns, n.severity, n.source, clean(shown.redact(n.text))) for n in kept]
+    return [Note(n.t_ns, n.severity, n.source, clean(n.text)) for n in kept]
 
 
 def verdict_facts(shown: Shown) -> dict[str, str]:
     """The verdict and what it is of, by name."""
-    from slamreplay import __version__
-
     judgement = shown.post.judgement
     confidence = judgement.confidence
     return {
@@ -54,7 +53,7 @@ def verdict_facts(shown: Shown) -> dict[str, str]:
         "bundle_id": shown.post.manifest.bundle_id,
         "state": judgement.state,
         "confidence": "" if confidence is None else f"{confidence:.4f}",
-        "summary": clean(shown.redact(judgement.summary)),
+        "summary": clean(judgement.summary),
         "failure_mode": judgement.failure_mode.kind,
         "start_ns": str(shown.start_ns),
         "end_ns": str(shown.end_ns),
@@ -67,7 +66,8 @@ def _verdict(shown: Shown) -> list[Note]:
     severity: Severity = "info" if judgement.state == "healthy" else "error"
     if judgement.state in ("unobservable", "insufficient_data"):
         severity = "warning"
-    sure = "" if judgement.confidence is None else f" (confidence {judgement.confidence:.0%})"
+    confidence = judgement.confidence
+    sure = "" if confidence is None else f" (confidence {confidence_text(confidence)})"
     found = [f"{STATES[judgement.state].name}{sure}: {judgement.summary}"]
     if judgement.failure_mode.kind != "none":
         found.append(f"failure mode: {FAILURE_MODES[judgement.failure_mode.kind]}")

@@ -30,8 +30,6 @@ from slamreplay.verdict.judgement import Interval, Stop
 #: beside the export.
 BASE_BELIEVED, BASE_HINDSIGHT = "base_believed", "base_hindsight"
 
-Redact = Callable[[str], str]
-
 
 @dataclass(frozen=True, eq=False)
 class Shown:
@@ -52,7 +50,6 @@ class Shown:
         states: the log's states, cut at the window.
         scene: what there was to see, None where nobody asked.
         lasers: by laser what it saw, piece by piece, all of its scans; nothing without a scene.
-        redact: takes names out of texts that may come from the log.
     """
 
     post: Postmortem
@@ -69,7 +66,6 @@ class Shown:
     states: tuple[Interval, ...]
     scene: Scene | None
     lasers: tuple[Callable[[], Iterator[SceneScans]], ...]
-    redact: Redact
 
     def has(self, t_ns: int) -> bool:
         """Whether a moment lies in the window."""
@@ -106,10 +102,8 @@ def shown(
     runs: Sequence[Run] = (),
     start_ns: int | None = None,
     end_ns: int | None = None,
-    redact: Redact | None = None,
 ) -> Shown:
     """The window [start_ns, end_ns] of a post-mortem; by default the whole log."""
-    redact = redact or (lambda text: text)
     first, last = post.manifest.start_ns, post.manifest.end_ns
     start_ns = first if start_ns is None else max(start_ns, first)
     end_ns = last if end_ns is None else min(end_ns, last)
@@ -132,7 +126,7 @@ def shown(
     regions = () if changes is None else changes.regions
     return Shown(
         post=post,
-        frame_id=redact(post.manifest.frames.map or "map"),
+        frame_id=post.manifest.frames.map or "map",
         start_ns=start_ns,
         end_ns=end_ns,
         place_ns=place_ns,
@@ -160,7 +154,6 @@ def shown(
         ),
         scene=scene,
         lasers=_lasers(post, view, place_ns, end_ns),
-        redact=redact,
     )
 
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import fields
 from datetime import UTC, datetime
 
-from slamreplay import __version__
 from slamreplay.bundle.manifest import Manifest
 from slamreplay.evidence.result import Postmortem
 from slamreplay.geometry.times import NS_PER_S
 from slamreplay.report.cells import Cell, Table, table
 from slamreplay.report.phrases import NOT_KNOWN, seconds
+from slamreplay.version import __version__
 
 #: Where the rows of the log's own description are.
 _MANIFEST = "the bundle's manifest.json"

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-from slamreplay import __version__
 from slamreplay.bundle.findings import Finding
 from slamreplay.evidence.result import Postmortem, TrialResult
 from slamreplay.report.assess import title_of
@@ -30,6 +29,7 @@ from slamreplay.report.model import (
 )
 from slamreplay.rootcause.result import RootCause
 from slamreplay.verdict.judgement import Consumed
+from slamreplay.version import __version__
 
 TRAJECTORY_FILE = "hindsight.tum"
 

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from slamreplay.evidence.result import Postmortem
-from slamreplay.evidence.words import FAILURE_MODES
+from slamreplay.evidence.words import FAILURE_MODES, confidence_text
 from slamreplay.report.cells import Cell, Table, table
 from slamreplay.report.moments import moment_cell
-from slamreplay.report.phrases import percent, seconds
+from slamreplay.report.phrases import seconds
 from slamreplay.rootcause.result import Candidate
 
 _HEAD = ("began as", "what was put back", "how much", "from", "what it did", "probability")
@@ -24,7 +24,7 @@ def _row(one: Candidate, post: Postmortem) -> tuple[str | Cell, ...]:
     much = "" if one.level is None else f"{one.level:.3g} {one.unit}".replace(" ratio", "")
     since = Cell("all along") if one.start_ns is None else moment_cell(post, one.start_ns)
     name = "no single thing" if one.kind == "none" else FAILURE_MODES[one.kind]
-    return name, one.perturbation or "", much, since, one.text, percent(one.probability)
+    return name, one.perturbation or "", much, since, one.text, confidence_text(one.probability)
 
 
 def cause_note(post: Postmortem) -> str:

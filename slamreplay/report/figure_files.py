@@ -10,7 +10,6 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from slamreplay import __version__
 from slamreplay.bundle.atomic import atomic_folder, check_target
 from slamreplay.errors import UsageError
 from slamreplay.evidence.clean import as_markdown
@@ -18,6 +17,7 @@ from slamreplay.evidence.result import Postmortem
 from slamreplay.report.figures import canvas
 from slamreplay.report.figures.panels import PANELS, Panel, caption
 from slamreplay.report.figures.written import captioned_png, captioned_svg
+from slamreplay.version import __version__
 
 #: By this file a folder of figures is known; it lists them for programs.
 MARKER = "figures.json"

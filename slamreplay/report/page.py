@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from slamreplay import __version__
 from slamreplay.evidence.result import Postmortem
-from slamreplay.evidence.words import FAILURE_MODES, STATES, StateWords
+from slamreplay.evidence.words import FAILURE_MODES, STATES, StateWords, confidence_text
 from slamreplay.report import (
     audit_tables,
     basis,
@@ -23,9 +22,10 @@ from slamreplay.report.facts import Fact, deciding_facts
 from slamreplay.report.finding_rows import FindingGroup, anchors, finding_groups
 from slamreplay.report.innovations import innovations
 from slamreplay.report.latency import latency_note, usage_table
-from slamreplay.report.phrases import percent, seconds
+from slamreplay.report.phrases import seconds
 from slamreplay.report.summary import summary_text
 from slamreplay.report.timeline import HATCHES, Band, bands, marks, timeline_alt
+from slamreplay.version import __version__
 
 
 @dataclass(frozen=True)
@@ -114,7 +114,7 @@ def page(post: Postmortem) -> Page:
         when=basis.when(manifest),
         state=judgement.state,
         words=STATES[judgement.state],
-        confidence=percent(judgement.confidence),
+        confidence=confidence_text(judgement.confidence),
         summary=judgement.summary,
         facts=deciding_facts(post),
         failure_mode=_failure_mode(post),
@@ -183,5 +183,5 @@ def _failure_mode(post: Postmortem) -> str:
     mode = post.judgement.failure_mode
     if mode.kind == "none":
         return ""
-    sure = "" if mode.confidence is None else f" ({percent(mode.confidence)})"
+    sure = "" if mode.confidence is None else f" ({confidence_text(mode.confidence)})"
     return f"{FAILURE_MODES[mode.kind]}{sure}"

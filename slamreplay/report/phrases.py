@@ -7,7 +7,7 @@ import re
 import numpy as np
 
 from slamreplay.evidence.result import Postmortem
-from slamreplay.evidence.words import STATES
+from slamreplay.evidence.words import STATES, confidence_text
 from slamreplay.geometry.times import NS_PER_S
 from slamreplay.verdict.reliability import Reliability
 
@@ -23,10 +23,9 @@ def bound(text: str) -> str:
     return _QUANTITY.sub("\N{NO-BREAK SPACE}", text)
 
 
-def percent(share: float | None) -> str:
-    """A share from 0 to 1."""
-    # 100 % would claim more than any evidence gives.
-    return "not known" if share is None else f"{min(100.0 * share, 99.0):.0f} %"
+def percent(share: float) -> str:
+    """A share from 0 to 1 of what was counted; of what is believed see `confidence_text`."""
+    return f"{100.0 * share:.0f} %"
 
 
 def seconds(t_ns: float) -> str:
@@ -167,11 +166,11 @@ def confidence_note(confidence: float | None, record: Reliability) -> str:
         return f"This log's state has no confidence. The diagram was measured {where}"
     alike = record.bin_of(confidence)
     if alike is None:
-        return f"Nothing was ever said with {percent(confidence)} confidence {where}"
+        return f"Nothing was ever said with {confidence_text(confidence)} confidence {where}"
     low, high, right = (f"{100.0 * x:.3g}" for x in (alike.low, alike.high, alike.right))
     return (
-        f"This log's state is said with {percent(confidence)} confidence. Moments said with {low} "
-        f"to {high} % were right in {right} % of the cases, measured {where}"
+        f"This log's state is said with {confidence_text(confidence)} confidence. Moments said "
+        f"with {low} to {high} % were right in {right} % of the cases, measured {where}"
     )
 
 

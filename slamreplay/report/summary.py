@@ -8,11 +8,11 @@ from typing import Literal
 
 from slamreplay.bundle.findings import SEVERITIES
 from slamreplay.evidence.result import Postmortem
-from slamreplay.evidence.words import FAILURE_MODES, STATES, meaning_of
+from slamreplay.evidence.words import FAILURE_MODES, STATES, confidence_text, meaning_of
 from slamreplay.geometry.times import NS_PER_S
 from slamreplay.report.assess import title_of
 from slamreplay.report.facts import Fact, deciding_facts
-from slamreplay.report.phrases import percent, seconds, span
+from slamreplay.report.phrases import seconds, span
 from slamreplay.verdict.judgement import State
 from slamreplay.verdict.words import square_metres
 
@@ -51,7 +51,7 @@ def summary_lines(post: Postmortem) -> tuple[SummaryLine, ...]:
     judgement = post.judgement
     meaning, sure = meaning_of(judgement.state, has_belief=post.belief is not None), ""
     if judgement.confidence is not None:
-        sure = f", confidence {percent(judgement.confidence)}"
+        sure = f", confidence {confidence_text(judgement.confidence)}"
     tone = _STATE_TONES[judgement.state]
     belief, beams, hindsight = deciding_facts(post)
     return (
@@ -87,14 +87,14 @@ def _cause(post: Postmortem) -> str:
     mode, cause = post.judgement.failure_mode, post.root_cause
     if cause is not None and cause.trials:
         mostly = FAILURE_MODES[cause.began_as] if cause.began_as != "none" else "no single thing"
-        likely = f"{mostly}, {percent(cause.probability)}, by {cause.trials} replays"
+        likely = f"{mostly}, {confidence_text(cause.probability)}, by {cause.trials} replays"
         best = cause.candidates[0].text if cause.candidates else cause.reason
         if mode.kind not in (cause.began_as, "none"):
             likely = f"began as {FAILURE_MODES[mode.kind]}; root cause {likely}"
         return f"{likely}: {best}" if best else likely
     if mode.kind == "none":
         return "nothing failed" if post.judgement.state == "healthy" else "not known"
-    sure = "" if mode.confidence is None else f", {percent(mode.confidence)}"
+    sure = "" if mode.confidence is None else f", {confidence_text(mode.confidence)}"
     why = f": {mode.evidence[0]}" if mode.evidence else ""
     return f"{FAILURE_MODES[mode.kind]}{sure}{why}"
 

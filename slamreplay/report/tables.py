@@ -7,10 +7,10 @@ from collections.abc import Mapping
 import numpy as np
 
 from slamreplay.evidence.result import Postmortem
-from slamreplay.evidence.words import STATES
+from slamreplay.evidence.words import STATES, confidence_text
 from slamreplay.report.cells import Cell, Table, table
 from slamreplay.report.moments import moment_cell, span_cell
-from slamreplay.report.phrases import NOT_KNOWN, number, percent, seconds, short
+from slamreplay.report.phrases import NOT_KNOWN, number, seconds, short
 from slamreplay.verdict.judgement import Consumed
 
 #: The metrics that have a column on the page, as it calls them; report.json has them all.
@@ -35,7 +35,7 @@ def intervals(post: Postmortem, anchors: Mapping[str, str]) -> Table:
             STATES[i.state].name,
             span_cell(post, i.start_ns, i.end_ns),
             seconds(i.duration_ns),
-            percent(i.confidence),
+            confidence_text(i.confidence),
             number(i.max_error_m, ".2f", "m"),
             number(None if i.max_error_rad is None else np.degrees(i.max_error_rad), ".0f", "deg"),
             Cell(
@@ -115,7 +115,7 @@ def regions(post: Postmortem) -> Table:
             number(r.area_m2, ".2f", "m²"),
             span_cell(post, r.first_seen_ns, r.last_seen_ns),
             f"{r.views}",
-            percent(r.confidence),
+            confidence_text(r.confidence),
         )
         for k, r in enumerate(regions, start=1)
     ]

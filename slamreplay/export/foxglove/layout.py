@@ -154,7 +154,7 @@ def _drawn(topic: str, schema: str, shown: Shown) -> Config | None:
             "arrowScale": [0.6, 0.08, 0.08],
         }
     if kind == "SceneUpdate":
-        frames = {topics.path(topics.run(n)): shown.redact(t.frame_id) for n, t in shown.runs}
+        frames = {topics.path(topics.run(n)): t.frame_id for n, t in shown.runs}
         return {"visible": frames.get(topic, shown.frame_id) == shown.frame_id}
     return None
 

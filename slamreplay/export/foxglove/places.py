@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from slamreplay.bundle.products import ChangedRegion
 from slamreplay.evidence import colours
+from slamreplay.evidence.clean import clean
 from slamreplay.export.changed_cells import APPEARED, REMOVED, changed_cells
 from slamreplay.export.foxglove import topics
 from slamreplay.export.foxglove.parts import (
@@ -137,7 +138,7 @@ def _stops(shown: Shown) -> Stream:
                 timestamp=stamp(stop.t_ns),
                 frame_id=shown.frame_id,
                 id=f"stop {number}",
-                metadata=[KeyValuePair(key="cause", value=shown.redact(stop.cause))],
+                metadata=[KeyValuePair(key="cause", value=clean(stop.cause))],
                 spheres=[ball],
                 texts=[text(f"stop {number}", at[:2], "#ffffff")],
             )

@@ -38,9 +38,9 @@ def robots(shown: Shown) -> Iterator[Stream]:
     yield _parting(shown)
     for number, (name, track) in enumerate(shown.runs):
         topic = topics.run(name)
-        frame = shown.redact(track.frame_id)
+        frame, colour = track.frame_id, colours.RUNS[number % len(colours.RUNS)]
         yield _poses(topic, frame, track)
-        yield _path(topic, frame, track, colours.RUNS[number % len(colours.RUNS)], shown.start_ns)
+        yield _path(topic, frame, track, colour, shown.start_ns)
 
 
 def _poses(topic: str, frame: str, track: PoseTrack) -> Stream:

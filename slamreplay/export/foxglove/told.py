@@ -45,7 +45,7 @@ def _verdict(shown: Shown) -> Stream:
         confidence=_or_nan(judgement.confidence),
         failure_mode=judgement.failure_mode.kind,
         findings=[
-            clean(shown.redact(f"{finding.severity} {finding.id}: {finding.message}"))
+            clean(f"{finding.severity} {finding.id}: {finding.message}")
             for finding in shown.post.findings
         ],
     )

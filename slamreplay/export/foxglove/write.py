@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from heapq import merge
 from itertools import chain
 from pathlib import Path
@@ -31,7 +31,6 @@ def write_foxglove(
     runs: Sequence[Run] = (),
     start_ns: int | None = None,
     end_ns: int | None = None,
-    redact: Callable[[str], str] | None = None,
     report_json: str | None = None,
 ) -> None:
     """Write `slamreplay.mcap` and `layout.json` into a folder that exists.
@@ -45,10 +44,9 @@ def write_foxglove(
         runs: replayed estimators to be laid beside it.
         start_ns: first moment that is written, on the bundle's clock; judged was all of it.
         end_ns: last moment that is written.
-        redact: takes names out of texts that may come from the log.
         report_json: the report, to be attached.
     """
-    what = shown(post, view, runs=runs, start_ns=start_ns, end_ns=end_ns, redact=redact)
+    what = shown(post, view, runs=runs, start_ns=start_ns, end_ns=end_ns)
     with McapLog(folder / MCAP) as log:
         log.facts("slamreplay", verdict_facts(what))
         if report_json is not None:

@@ -67,11 +67,7 @@ def pose_stream(
         return ros.make(
             "geometry_msgs/PoseWithCovarianceStamped",
             header=ros.header(stamps[i], t["frame_id"][i]),
-            pose=ros.make(
-                "geometry_msgs/PoseWithCovariance",
-                pose=ros.pose_of(place[i], turn[i]),
-                covariance=covariance[i],
-            ),
+            pose=ros.pose_with_covariance_of(place[i], turn[i], covariance[i]),
         )
 
     return Stream(topic, "geometry_msgs/PoseWithCovarianceStamped", rows.t_log_ns, message)

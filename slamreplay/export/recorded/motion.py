@@ -57,11 +57,7 @@ def _odometry(topic: str, rows: Rows, ros: Composer) -> Stream:
             "nav_msgs/Odometry",
             header=ros.header(stamps[i], t["frame_id"][i]),
             child_frame_id=t["child_frame_id"][i],
-            pose=ros.make(
-                "geometry_msgs/PoseWithCovariance",
-                pose=ros.pose_of(place[i], turn[i]),
-                covariance=pose_cov[i],
-            ),
+            pose=ros.pose_with_covariance_of(place[i], turn[i], pose_cov[i]),
             twist=ros.make(
                 "geometry_msgs/TwistWithCovariance",
                 twist=ros.twist_of(linear[i], angular[i]),

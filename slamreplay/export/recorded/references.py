@@ -63,11 +63,7 @@ def _posed(topic: str, rows: Rows, ros: Composer, missed: list[NotAsRecorded]) -
             "nav_msgs/Odometry",
             header=ros.header(stamps[i], t["frame_id"][i]),
             child_frame_id=t["child_frame_id"][i],
-            pose=ros.make(
-                "geometry_msgs/PoseWithCovariance",
-                pose=ros.pose_of(place[i], turn[i]),
-                covariance=covariance[i],
-            ),
+            pose=ros.pose_with_covariance_of(place[i], turn[i], covariance[i]),
             twist=still,
         )
 
@@ -94,11 +90,7 @@ def _tags(topic: str, rows: Rows, ros: Composer, missed: list[NotAsRecorded]) ->
         posed = ros.make(
             "geometry_msgs/PoseWithCovarianceStamped",
             header=header,
-            pose=ros.make(
-                "geometry_msgs/PoseWithCovariance",
-                pose=ros.pose_of(place[i], turn[i]),
-                covariance=covariance[i],
-            ),
+            pose=ros.pose_with_covariance_of(place[i], turn[i], covariance[i]),
         )
         found = ros.make(
             "apriltag_ros/AprilTagDetection",

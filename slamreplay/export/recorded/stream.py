@@ -55,6 +55,13 @@ class Composer(Messages):
         turn = self.make("geometry_msgs/Quaternion", **_named("xyzw", orientation))
         return self.make("geometry_msgs/Pose", position=point, orientation=turn)
 
+    def pose_with_covariance_of(
+        self, position: Sequence[float], orientation: Sequence[float], covariance: NDArray
+    ) -> Any:
+        """geometry_msgs/PoseWithCovariance of the same and a covariance (36,), as ROS has it."""
+        pose = self.pose_of(position, orientation)
+        return self.make("geometry_msgs/PoseWithCovariance", pose=pose, covariance=covariance)
+
     def planar(self, xyyaw: NDArray[np.float64]) -> list[Any]:
         """geometry_msgs/Pose of each of (N, 3) planar poses."""
         turns = se3.quaternion_from_yaw(xyyaw[:, 2]).tolist()

@@ -8,27 +8,15 @@ only where it is used.
 
 from __future__ import annotations
 
-import importlib.util
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 from slamreplay.bundle.run import Run
 from slamreplay.bundle.view import BundleView
-from slamreplay.errors import UsageError
 from slamreplay.evidence.result import Postmortem
 from slamreplay.export.shown import shown
 
 RRD = "slamreplay.rrd"
-
-
-def check_rerun() -> None:
-    """Say in one line that Rerun's library is not there.
-
-    Raises:
-        UsageError: it is not.
-    """
-    if importlib.util.find_spec("rerun") is None:
-        raise UsageError("rerun-sdk is not installed", hint="pip install 'slamreplay[rerun]'")
 
 
 def write_rerun(
@@ -39,24 +27,19 @@ def write_rerun(
     runs: Sequence[Run] = (),
     start_ns: int | None = None,
     end_ns: int | None = None,
-    redact: Callable[[str], str] | None = None,
 ) -> None:
     """Write `slamreplay.rrd` into a folder that exists; arguments are those of `write_foxglove`.
 
     Same findings, same content; Rerun gives each of its chunks an id made of the time of day, so
-    that the bytes differ.
-
-    Raises:
-        UsageError: Rerun's library is not installed.
+    that the bytes differ. Whether the library is there `slamreplay.export.formats.needs` asks.
     """
-    check_rerun()
     from slamreplay.export.rerun.places import draw_places
     from slamreplay.export.rerun.plotted import plot
     from slamreplay.export.rerun.robots import draw_robots
     from slamreplay.export.rerun.screen import screen
     from slamreplay.export.rerun.sink import Sink
 
-    what = shown(post, view, runs=runs, start_ns=start_ns, end_ns=end_ns, redact=redact)
+    what = shown(post, view, runs=runs, start_ns=start_ns, end_ns=end_ns)
     with Sink(folder / RRD, what.post.manifest.bundle_id, screen(what)) as sink:
         plot(what, sink)
         draw_places(what, sink)

@@ -8,7 +8,7 @@ import rerun as rr
 from slamreplay.bundle.findings import Severity
 from slamreplay.evidence import colours
 from slamreplay.evidence.scene import LaneKey
-from slamreplay.evidence.words import FAILURE_MODES, STATES
+from slamreplay.evidence.words import FAILURE_MODES, STATES, confidence_text
 from slamreplay.export.notes import notes, verdict_facts
 from slamreplay.export.rerun.batches import rgba
 from slamreplay.export.rerun.sink import Sink
@@ -67,7 +67,7 @@ def _verdict(shown: Shown) -> str:
     facts, judgement = verdict_facts(shown), shown.post.judgement
     lines = [f"# {STATES[judgement.state].name}", "", facts["summary"], ""]
     if judgement.confidence is not None:
-        lines.append(f"- confidence {judgement.confidence:.0%}")
+        lines.append(f"- confidence {confidence_text(judgement.confidence)}")
     lines.append(f"- failure mode: {FAILURE_MODES[judgement.failure_mode.kind]}")
     lines.append(f"- slamreplay {facts['slamreplay']}, bundle {facts['bundle_id']}")
     return "\n".join(lines)

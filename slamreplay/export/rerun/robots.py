@@ -40,7 +40,7 @@ def draw_robots(shown: Shown, sink: Sink) -> None:
     _draw_parting(shown, sink)
     _draw_particles_and_plans(shown, sink)
     for number, (name, track) in enumerate(shown.runs):
-        frame = shown.redact(track.frame_id)
+        frame = track.frame_id
         space = ["map"] if frame == shown.frame_id else ["frames", frame]
         entity = rr.new_entity_path([*space, "runs", name])
         _draw_path(entity, track, sink, colours.RUNS[number % len(colours.RUNS)])

@@ -18,27 +18,20 @@ from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.transforms import Bbox
 from numpy.typing import NDArray
 
+from slamreplay.evidence import colours
 from slamreplay.geometry.se2 import Array
 
 if TYPE_CHECKING:
     import PIL.Image
 
-#: Okabe and Ito's colours, told apart with every common kind of colour blindness.
-BLUE, SKY, GREEN, YELLOW = "#0072B2", "#56B4E9", "#009E73", "#F0E442"
-ORANGE, VERMILLION, PURPLE = "#E69F00", "#D55E00", "#CC79A7"
+BLUE, SKY, GREEN, YELLOW = colours.BLUE, colours.SKY, colours.GREEN, colours.YELLOW
+ORANGE, VERMILLION, PURPLE = colours.ORANGE, colours.VERMILLION, colours.PURPLE
 INK, FAINT, RULE = "#22272b", "#6b7278", "#dfe1dc"
 
 #: Beams and cells that contradict the map: the family of the state's own colour.
 APPEARED, REMOVED = ORANGE, YELLOW
 
-STATE_COLOURS = {
-    "healthy": GREEN,
-    "lost": VERMILLION,
-    "map_changed": ORANGE,
-    "lost_and_map_changed": PURPLE,
-    "unobservable": SKY,
-    "insufficient_data": "#9aa0a6",
-}
+STATE_COLOURS: dict[str, str] = dict(colours.STATES.items())
 
 #: Inches: a desktop column, the half of it beside the facts, and a phone.
 WIDE, BESIDE, NARROW = 11.0, 7.4, 3.9

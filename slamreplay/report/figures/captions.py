@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 
-from slamreplay import __version__
 from slamreplay.consistency.belief.summary import PartSummary
 from slamreplay.evidence.clean import clean
 from slamreplay.evidence.result import Postmortem
-from slamreplay.evidence.words import FAILURE_MODES, STATES
+from slamreplay.evidence.words import FAILURE_MODES, STATES, confidence_text
 from slamreplay.geometry.times import NS_PER_S
 from slamreplay.report.designs import design_of
 from slamreplay.report.dose_tables import level_text, panel_of
 from slamreplay.report.figures.doses import response_label
 from slamreplay.report.figures.map import NAMED
-from slamreplay.report.phrases import graph_alt, map_note, percent, reference_note, seconds, short
+from slamreplay.report.phrases import graph_alt, map_note, reference_note, seconds, short
+from slamreplay.version import __version__
 
 #: So many curves of a design are told in numbers; the report has them all.
 _CURVES = 6
@@ -140,7 +140,7 @@ def reliability_caption(post: Postmortem) -> str:
     """What confidence is worth."""
     record, said = post.reliability, post.judgement.confidence
     ece = "" if record.ece is None else f", expected calibration error {short(record.ece)}"
-    here = "" if said is None else f" This log's verdict is said with {percent(said)}."
+    here = "" if said is None else f" This log's verdict is said with {confidence_text(said)}."
     return (
         "Reliability diagram: share of moments whose state was the true one against the confidence "
         f"it was said with; {record.moments:,} moments of {record.logs} simulated logs that "
@@ -157,14 +157,14 @@ def cause_caption(post: Postmortem) -> str:
     return (
         "Probability of each single cause to reproduce what went wrong, put back one at a time "
         f"into evidence healed by hindsight; {cause.trials} replays. Began as "
-        f"{FAILURE_MODES[cause.began_as]} ({percent(cause.probability)}): {text}"
+        f"{FAILURE_MODES[cause.began_as]} ({confidence_text(cause.probability)}): {text}"
     )
 
 
 def _verdict(post: Postmortem) -> str:
-    judgement = post.judgement
-    sure = "" if judgement.confidence is None else f", confidence {percent(judgement.confidence)}"
-    return f"Verdict: {STATES[judgement.state].name.lower()}{sure}."
+    state, confidence = post.judgement.state, post.judgement.confidence
+    sure = "" if confidence is None else f", confidence {confidence_text(confidence)}"
+    return f"Verdict: {STATES[state].name.lower()}{sure}."
 
 
 def _offset(post: Postmortem) -> str:

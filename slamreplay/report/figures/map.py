@@ -7,28 +7,23 @@ from typing import Literal
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.patches import Patch, Rectangle
-from matplotlib.transforms import Affine2D
-from numpy.typing import NDArray
+from matplotlib.patches import Rectangle
 
 from slamreplay.bundle.products import ChangedRegion
 from slamreplay.evidence.result import Postmortem
 from slamreplay.geometry import se2
-from slamreplay.maps.grid import OccupancyGrid
 from slamreplay.report.figures import canvas
 from slamreplay.report.figures.canvas import (
-    APPEARED,
     BLUE,
     FAINT,
     INK,
-    REMOVED,
     VERMILLION,
     Part,
 )
 from slamreplay.report.figures.fitted import fit_plane
+from slamreplay.report.figures.map_cells import draw_grid
 
 _MARGIN_M = 2.5
 #: So many regions, the largest, bear their number; the others' would hide the map.
@@ -74,7 +69,7 @@ def draw_map(axes: Axes, post: Postmortem, size: float = 9.5) -> list[object]:
     low, high = _window(post, paths)
     handles: list[object] = []
     if post.grid is not None and alone is None:
-        handles += _draw_grid(axes, post, post.grid, low, high)
+        handles += draw_grid(axes, post, post.grid, low, high)
     frame = post.manifest.frames.odom if alone is not None else post.manifest.frames.map
     frame = frame or ("odom" if alone is not None else "map")
     canvas.dress(axes, f"x in {frame} [m]", f"y in {frame} [m]", size)
@@ -150,51 +145,6 @@ def _window(post: Postmortem, paths: list[se2.Array]) -> tuple[se2.Array, se2.Ar
 def _regions(post: Postmortem) -> list[ChangedRegion]:
     changes = None if post.hindsight is None else post.hindsight.changes
     return [] if changes is None else list(changes.regions)
-
-
-def _draw_grid(
-    axes: Axes, post: Postmortem, grid: OccupancyGrid, low: se2.Array, high: se2.Array
-) -> list[object]:
-    corners = np.array([low, [low[0], high[1]], high, [high[0], low[1]]])
-    cells = grid.cell_of(corners)
-    shape = np.array(grid.cells.shape)
-    first = np.clip(cells.min(axis=0), 0, shape)
-    last = np.clip(cells.max(axis=0) + 1, 0, shape)
-    if (last <= first).any():
-        return []  # the paths lie beside the map altogether
-    part = (slice(first[0], last[0]), slice(first[1], last[1]))
-    block = max(1, int(np.ceil(np.max(last - first) / 900)))
-    image = np.ones((*_pooled(grid.occupied[part], block).shape, 3)) * to_rgb("#eceeea")
-    image[_pooled(grid.free[part], block)] = to_rgb("#ffffff")
-    image[_pooled(grid.occupied[part], block)] = to_rgb("#3b4146")
-    handles: list[object] = []
-    changes = None if post.hindsight is None else post.hindsight.changes
-    if changes is not None:
-        for mask, colour, label in (
-            (changes.removed, REMOVED, "mapped, but gone"),
-            (changes.appeared, APPEARED, "stands there, not mapped"),
-        ):
-            if mask[part].any():
-                image[_pooled(mask[part], block)] = to_rgb(colour)
-                handles.append(Patch(facecolor=colour, edgecolor=FAINT, lw=0.6, label=label))
-    step = grid.resolution_m * block
-    x0, y0 = first[1] * grid.resolution_m, first[0] * grid.resolution_m
-    extent = (x0, x0 + image.shape[1] * step, y0, y0 + image.shape[0] * step)
-    place = Affine2D().rotate(grid.origin_xyyaw[2]).translate(*grid.origin_xyyaw[:2])
-    shown = axes.imshow(image, extent=extent, origin="lower", interpolation="nearest", zorder=1)
-    shown.set_transform(place + axes.transData)
-    return handles
-
-
-def _pooled(mask: NDArray[np.bool_], block: int) -> NDArray[np.bool_]:
-    """Blocks of cells in which any is true: a thin wall survives a coarse picture."""
-    if block == 1:
-        return mask
-    height, width = (-(-n // block) * block for n in mask.shape)
-    whole = np.zeros((height, width), dtype=bool)
-    whole[: mask.shape[0], : mask.shape[1]] = mask
-    blocks = whole.reshape(height // block, block, width // block, block)
-    return np.asarray(blocks.any(axis=(1, 3)))
 
 
 def _draw_paths(axes: Axes, post: Postmortem, alone: se2.Array | None) -> list[object]:

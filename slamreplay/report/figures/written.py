@@ -9,9 +9,9 @@ from xml.sax.saxutils import escape
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from slamreplay import __version__
 from slamreplay.report.figures.canvas import FAINT, few_colours, pixels, svg_bytes
 from slamreplay.report.phrases import bound
+from slamreplay.version import __version__
 
 if TYPE_CHECKING:
     import PIL.Image

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slamreplay.bundle.products import Changes
+from slamreplay.maps.blocks import highest_in_blocks
 from slamreplay.maps.grid import OccupancyGrid
 
 #: What a cell was mapped as: the lowest two bits of its code. In a block of cells the highest
@@ -57,17 +58,9 @@ def ground_of(grid: OccupancyGrid, changes: Changes | None) -> Ground | None:
     block = max(1, int(np.ceil(np.sqrt(codes.size / _MOST_CELLS))))
     x, y, yaw = (float(v) for v in grid.origin_xyyaw)
     return Ground(
-        _highest(codes, block) | _highest(became, block),
+        highest_in_blocks(codes, block) | highest_in_blocks(became, block),
         grid.resolution_m * block,
         block,
         (first[1] * grid.resolution_m, first[0] * grid.resolution_m),
         (x, y, yaw),
     )
-
-
-def _highest(codes: NDArray[np.uint8], block: int) -> NDArray[np.uint8]:
-    height, width = (-(-n // block) * block for n in codes.shape)
-    whole = np.zeros((height, width), dtype=np.uint8)
-    whole[: codes.shape[0], : codes.shape[1]] = codes
-    blocks = whole.reshape(height // block, block, width // block, block)
-    return np.asarray(blocks.max(axis=(1, 3)))
