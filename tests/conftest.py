@@ -7,6 +7,9 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
+# A worker of pytest-xdist exports a width, to which every command would fold its output.
+os.environ.pop("COLUMNS", None)
+
 # The same examples on every run: a change is judged by what it changed. Others are tried with
 # `pytest --hypothesis-profile default`.
 settings.register_profile("steady", derandomize=True)
