@@ -203,6 +203,9 @@ def test_intervals_and_findings_are_those_of_the_report(r):
     assert r.intervals.attrs["units"]["max_error_m"] == "m"
     assert "SR-LOC-001" in set(r.findings["id"])
     assert r.findings["value"].dtype == "float64"
+    assert r.findings["n"].dtype == "Int64"
+    assert r.intervals["confidence"].dtype == "float64"
+    assert r.regions["bbox_m"].dtype == "object"
 
 
 def test_unknown_times_and_texts_are_missing_and_frames_keep_their_columns():

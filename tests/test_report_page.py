@@ -21,13 +21,16 @@ from slamreplay.evidence.words import confidence_text
 from slamreplay.ingest.pipeline import ingest
 from slamreplay.postmortem import postmortem
 from slamreplay.report.audit_tables import edges, streams
+from slamreplay.report.cells import MOST_ROWS, table
 from slamreplay.report.figures.canvas import FAINT, INK
 from slamreplay.report.figures.neutral import DARK_PAPER, dark_of
 from slamreplay.report.finding_rows import MOST_FINDINGS
 from slamreplay.report.html import html
 from slamreplay.report.moments import moment_link
+from slamreplay.report.page import page as page_told_of
 from slamreplay.report.phrases import percent
 from slamreplay.report.print_style import print_style
+from slamreplay.report.sections import sections
 from slamreplay.testing.synthetic import START_NS, synthetic_bundle
 
 S = 1_000_000_000
@@ -338,3 +341,12 @@ def test_the_audit_tells_rates_gaps_and_delays_of_each_stream_and_edge(posts):
     assert "odom \N{RIGHTWARDS ARROW} base_link" in pairs
     assert streams(posts["bare"]).rows == edges(posts["bare"]).rows == ()
     assert postmortem(synthetic_bundle(seconds=4.0)).audit["frames"]["base"] == "base_link"
+
+
+def test_contents_count_what_tables_leave_to_a_file():
+    told = page_told_of(lost_post())
+    many = table(("when", "how far"), [["1 s", "2 m"]] * (MOST_ROWS + 7))
+    every = sections(replace(told, jumps=many, stops=many), {"reliability": None})
+
+    counts = {section.anchor: section.count for section in every}
+    assert counts["jumps"] == counts["stops"] == MOST_ROWS + 7

@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as npst
 
 from slamreplay.bundle.map_course import Held, MapStretch
+from slamreplay.bundle.met import BeamsMet
 from slamreplay.bundle.products import ChangedRegion, Changes, Hindsight, Part
 from slamreplay.bundle.track import PoseTrack
 from slamreplay.evidence.result import Postmortem
@@ -477,6 +478,19 @@ def test_the_policy_lets_that_one_script_run(post, page_of):
     assert f"script-src 'sha256-{digest}'" in policy
     assert "unsafe" not in policy
     assert not re.search(r"\beval\b|new Function|innerHTML|outerHTML|insertAdjacentHTML", script)
+
+
+def test_a_laser_that_took_no_part_in_hindsight_is_told(post):
+    both = replace(post, scene=replace(post.scene, scans=(scans_of(), scans_of(seed=1))))
+    one = BeamsMet(scans_of().t_ns, scans_of().met)
+
+    def notes(*met):
+        changes = replace(post.hindsight.changes, met=met)
+        shown = replace(both, hindsight=replace(post.hindsight, changes=changes))
+        return " ".join(replay_of(shown).notes)
+
+    assert "Laser 2 took no part in hindsight" in notes(one)
+    assert "took no part" not in notes(one, one)
 
 
 def test_without_scans_none_are_promised(post):

@@ -27,7 +27,7 @@ _WITHOUT = {
     ),
     "covariance": (
         "no pose that carries a covariance",
-        "whether the localizer's confidence was earned (NEES, coverage) cannot be judged",
+        "whether the localizer's confidence was earned is told by particles alone, if at all",
     ),
     "map": (
         "no nav_msgs/OccupancyGrid map in the log, none given with --map",

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, get_args
+from types import UnionType
+from typing import TYPE_CHECKING, Annotated, Any, Union, get_args, get_origin
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -32,7 +33,7 @@ def parts_frame(parts: Sequence[BaseModel], kind: type[BaseModel], start_ns: int
     columns: dict[str, Any] = {}
     for name, field in kind.model_fields.items():
         values = [getattr(part, name) for part in parts]
-        kinds = set(get_args(field.annotation) or (field.annotation,))
+        kinds = _kinds(field.annotation)
         if name.endswith("_ns"):  # nullable, for a float holds no nanoseconds
             columns[name] = pd.array(values, dtype="Int64")
             seconds = [None if v is None else (v - start_ns) / 1e9 for v in values]
@@ -42,13 +43,24 @@ def parts_frame(parts: Sequence[BaseModel], kind: type[BaseModel], start_ns: int
     return with_units(pd.DataFrame(columns))
 
 
+def _kinds(annotation: Any) -> set[Any]:
+    """Types of an annotation's values: of a union its parts, without the limits that they have."""
+    if get_origin(annotation) is Annotated:
+        return _kinds(get_args(annotation)[0])
+    if get_origin(annotation) in (Union, UnionType):
+        return set().union(*(_kinds(part) for part in get_args(annotation)))
+    return {annotation}
+
+
 def _dtype(kinds: set[Any]) -> str:
     """Of a column whose values are of these types."""
     if kinds <= {float, type(None)}:
         return "float64"
     if kinds <= {bool, type(None)}:
         return "boolean" if type(None) in kinds else "bool"
-    return "int64" if kinds == {int} else "object"
+    if kinds <= {int, type(None)}:
+        return "Int64" if type(None) in kinds else "int64"
+    return "object"
 
 
 def track_frame(track: PoseTrack, start_ns: int) -> pd.DataFrame:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from slamreplay.report.cells import Table
 from slamreplay.report.page import Page
 
 
@@ -37,10 +38,10 @@ def sections(page: Page, pictures: Mapping[str, object]) -> tuple[Section, ...]:
     every = (
         (True, Section("when", "When it happened", "When")),
         (began, Section("cause", "What it began with", "Cause")),
-        (True, Section("stops", "Where it stopped, and why", "Stops", len(page.stops.rows))),
+        (True, Section("stops", "Where it stopped, and why", "Stops", _rows(page.stops))),
         (True, Section("findings", "Findings", "Findings", found)),
         (page.jumps.rows or page.trace_note,
-         Section("jumps", "Which measurement moved the belief", "Jumps", len(page.jumps.rows))),
+         Section("jumps", "Which measurement moved the belief", "Jumps", _rows(page.jumps))),
         (page.usages.rows, Section("pose-age", "How old was the pose?", "Age")),
         (True, Section("covariance", "Is the covariance honest?", "Covariance")),
         (page.means.rows, Section("consistency", "Consistency", "Consistency")),
@@ -56,3 +57,8 @@ def sections(page: Page, pictures: Mapping[str, object]) -> tuple[Section, ...]:
         (True, Section("ticket", "For a ticket", "Ticket")),
     )  # fmt: skip
     return tuple(section for told, section in every if told)
+
+
+def _rows(table: Table) -> int:
+    """How many a table tells of, those that it leaves to a file among them."""
+    return len(table.rows) + table.more

@@ -19,7 +19,13 @@ def notes(
     ground: Ground | None,
 ) -> tuple[str, ...]:
     """One sentence for each thing that a reader would otherwise take for the whole."""
-    return (*_places(post), *_scans(post, scans), *_overlays(overlays), *_ground(ground))
+    return (
+        *_places(post),
+        *_scans(post, scans),
+        *_left_out(post),
+        *_overlays(overlays),
+        *_ground(ground),
+    )
 
 
 def lead(tracks: Collection[str], *, has_scans: bool) -> str:
@@ -68,6 +74,18 @@ def _scans(post: Postmortem, scans: Sequence[PackedScans]) -> Iterator[str]:
         if told.every_beam > 1:
             text += f", every {_nth(told.every_beam)} of {told.of_beams:,} beams"
         yield f"{text}; ends rounded to 1 cm."
+
+
+def _left_out(post: Postmortem) -> Iterator[str]:
+    """Lasers that hindsight was not made of."""
+    changes = None if post.hindsight is None else post.hindsight.changes
+    lasers = 0 if post.scene is None else len(post.scene.scans)
+    if changes is not None and changes.met:
+        for k in range(len(changes.met), lasers):
+            yield (
+                f"Laser {k + 1} took no part in hindsight: the map fits what it saw far worse, or "
+                "places fewer scans of both. Its beams say nothing of the map."
+            )
 
 
 def _overlays(overlays: Sequence[tuple[str, Overlay]]) -> Iterator[str]:
