@@ -74,7 +74,7 @@ def test_bare_call_shows_the_help():
 
 def test_fault_of_ours_leaves_a_crash_file(monkeypatch, tmp_path, capsys):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    monkeypatch.setattr(sys, "argv", ["slamreplay", "inspect", "x"])
+    monkeypatch.setattr(sys, "argv", ["slamreplay", "inspect", "x\udcff"])  # as Linux may name it
 
     def broken(*_, **__):
         raise ZeroDivisionError("boom")

@@ -10,9 +10,11 @@ from export_logs import SECRET, everything
 from mcap.reader import make_reader
 from typer.testing import CliRunner
 
+from slamreplay.bundle.manifest import Loss, Missing
 from slamreplay.bundle.run import Estimate, Innovations, Run, Trial
 from slamreplay.bundle.schema import TABLES
 from slamreplay.bundle.track import PoseTrack
+from slamreplay.bundle.view import Bundle
 from slamreplay.cli import export
 from slamreplay.export.pseudonyms import Pseudonyms
 from slamreplay.export.redaction import Redactor
@@ -71,6 +73,29 @@ def test_nothing_that_identifies_is_left(bundle, tmp_path, to):
     plain = call(bundle.path, "--to", *to, "-o", tmp_path / "plain")
     assert plain.exit_code == 0
     assert any(SECRET.encode() in c.lower() for c in contents(tmp_path / "plain"))
+
+
+def test_no_text_of_the_manifest_is_left(bundle):
+    old = bundle.manifest
+    told = {
+        "sources": [s.model_copy(update={"name": f"{SECRET}.mcap"}) for s in old.sources],
+        "options": {"map": f"{SECRET}.yaml", "robot": SECRET},
+        "clock": old.clock.model_copy(update={"reason": SECRET}),
+        "roles": [r.model_copy(update={"reason": SECRET}) for r in old.roles],
+        "missing": [Missing(part="imu", reason=f"/{SECRET}/imu is empty", consequence="none")],
+        "maps": [m.model_copy(update={"source": f"{SECRET}.yaml"}) for m in old.maps],
+        "losses": [
+            Loss(kind="lost", what=what, count=1, reason=SECRET)
+            for what in (f"/{SECRET}/scan: its end", f"{SECRET}.mcap")
+        ],
+    }
+    secret = Bundle(
+        old.model_copy(update=told), {n: bundle.table(n) for n in TABLES}, bundle.grids()
+    )
+
+    text = Redactor(secret).bundle().manifest.model_dump_json()
+    assert SECRET not in text
+    assert "lost" in text
 
 
 def test_a_redacted_log_is_read_as_the_log_was(bundle, tmp_path):

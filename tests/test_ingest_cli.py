@@ -1,14 +1,18 @@
 """The commands ingest and inspect: data on stdout, one line for what the user can mend."""
 
 import json
+import shutil
 import subprocess
 import sys
 
+import pytest
 import typer
 from typer.testing import CliRunner
 
 from slamreplay.cli import ingest, inspect
-from slamreplay.errors import LogError
+from slamreplay.errors import LogError, UsageError
+from slamreplay.ingest.bundle_cache import ingest_once
+from slamreplay.ingest.options import IngestOptions
 
 
 def program():
@@ -35,6 +39,19 @@ def test_ingest_and_inspect_of_log_and_bundle_agree(logs, tmp_path):
     assert made.exit_code == 0, made.output
     assert json.loads(seen.stdout) == json.loads(raw.stdout) == json.loads(made.stdout)
     assert json.loads(seen.stdout)["roles"][0]["topic"] == "/scan"
+
+
+def test_a_name_that_is_no_utf_8_is_said_in_one_line(logs, tmp_path):
+    log = scan_log(logs)
+    odd = log.with_name("log\udcff.mcap")
+    try:
+        shutil.copy(log, odd)
+    except OSError:
+        pytest.skip("this file system takes no such name")
+
+    with pytest.raises(UsageError, match="no UTF-8"):
+        ingest_once([odd], tmp_path / "cache", IngestOptions())
+    assert not list(tmp_path.glob("cache/*"))
 
 
 def test_inspect_says_what_cannot_be_judged(logs):

@@ -7,6 +7,7 @@ import pytest
 from beam_truth import UNASKED, truth_of_beams
 from hypothesis import example, given
 from hypothesis import strategies as st
+from scipy.stats import chi2
 
 from slamreplay.bundle.manifest import Role
 from slamreplay.bundle.met import BeamsMet
@@ -106,6 +107,13 @@ def test_lanes_are_as_long_as_their_times_and_carry_the_verdicts_limits(boxed):
     assert all(len(lane.t_ns) == len(lane.values) for lane in lanes.values())
     assert np.array_equal(lanes["error_m"].values, post.error.distance_m, equal_nan=True)
     assert lanes["error_m"].limit == post.limits.position_m
+    heading = np.degrees(post.error.heading_rad)
+    assert np.array_equal(lanes["error_deg"].values, heading, equal_nan=True)
+    assert lanes["error_deg"].limit == pytest.approx(np.degrees(post.limits.yaw_rad))
+    axes = [np.sqrt(np.linalg.svd(c[:2, :2])[1][0]) for c in post.belief.cov]
+    assert lanes["sigma_m"].values == pytest.approx(np.array(axes))
+    assert lanes["nees"].limit == pytest.approx(chi2.ppf(0.99, 3))
+    assert lanes["changed_share"].limit == post.limits.changed_share
     assert "3 dof" in lanes["nees"].title
 
 

@@ -99,12 +99,13 @@ def run() -> int:
 
 def _crash_file() -> Path:
     """Where the traceback was written: the cache folder, or the temporary one if that fails."""
-    text = f"slamreplay {__version__}\n{' '.join(sys.argv)}\n\n{traceback.format_exc()}"
-    name = f"crash-{hashlib.sha256(text.encode()).hexdigest()[:12]}.txt"
+    told = f"slamreplay {__version__}\n{' '.join(sys.argv)}\n\n{traceback.format_exc()}"
+    text = told.encode(errors="backslashreplace")  # names of files need not be UTF-8
+    name = f"crash-{hashlib.sha256(text).hexdigest()[:12]}.txt"
     for folder in (cache_folder(), Path(tempfile.gettempdir())):
         try:
             folder.mkdir(parents=True, exist_ok=True)
-            (folder / name).write_text(text, encoding="utf-8")
+            (folder / name).write_bytes(text)
         except OSError:
             continue
         return folder / name

@@ -76,7 +76,7 @@ def made_once(cache: Path, told: Iterable[str], make: Callable[[Path], Bundle]) 
 def _key(told: Iterable[str]) -> str:
     digest = hashlib.sha256(f"{code_hash()} {np.__version__} {pa.__version__}\n".encode())
     for line in told:
-        digest.update(f"{line}\n".encode())
+        digest.update(f"{line}\n".encode(errors="surrogateescape"))
     return digest.hexdigest()[:32]
 
 

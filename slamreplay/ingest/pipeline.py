@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -68,11 +68,23 @@ def ingest(
         UsageError: options that do not fit the log.
         OutputError: the target is somebody else's, or cannot be written.
     """
+    _check_names([*logs, options.map, options.topics, options.reference])
     check_target(target, MANIFEST)
     # Beside the target, for /tmp may be memory and what waits there is too large for it.
     beside = next(folder for folder in target.absolute().parents if folder.exists())
     with TemporaryDirectory(prefix=f".{target.name}.", dir=beside) as scratch:
         return _ingest(logs, target, options, progress, Path(scratch))
+
+
+def _check_names(paths: Iterable[Path | None]) -> None:
+    """Names stand in the manifest, which is UTF-8; a file system takes any bytes for one."""
+    for path in paths:
+        try:
+            str(path).encode()
+        except UnicodeEncodeError as error:
+            raise UsageError(
+                "a name that is no UTF-8", where=str(path), hint="give the file another name"
+            ) from error
 
 
 def _ingest(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from slamreplay.evidence.clean import as_markdown, clean
-from slamreplay.evidence.words import STATES
+from slamreplay.evidence.words import STATES, confidence_text
 from slamreplay.notebook import markup
 
 if TYPE_CHECKING:
@@ -16,7 +16,11 @@ def lines_of(report: Report) -> list[tuple[str, str, str]]:
     """Label, text and tone: of a report from its file the verdict alone."""
     if report.post is None:
         verdict, bundle = report.verdict, report.content.bundle
-        sure = "" if verdict.confidence is None else f"confidence {verdict.confidence:.2f}"
+        sure = (
+            ""
+            if verdict.confidence is None
+            else f"confidence {confidence_text(verdict.confidence)}"
+        )
         worst = [f"{f.id} {f.title}" for f in report.content.findings if f.severity == "error"]
         return [
             (verdict.state, sure, "plain"),

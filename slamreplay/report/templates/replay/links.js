@@ -27,7 +27,7 @@ async function follow(hash) {
   if (player.playing) play(false);
   if (Number.isFinite(wanted.x + wanted.y) && wanted.z > 0) {
     sharpSize();
-    Object.assign(player.view, { x: wanted.x, y: wanted.y, scale: player.view.width / wanted.z, fitted: false });
+    Object.assign(player.view, { x: wanted.x, y: wanted.y, scale: Math.min(player.view.width / wanted.z, MOST_SCALE), fitted: false });
   }
   clearTimeout(linkTimer);
   moveTo(wanted.t);
