@@ -46,7 +46,7 @@ def callable_stage(name: str) -> None:
 
 
 def _function(stage: ModuleType) -> Callable[..., Any]:
-    found: Callable[..., Any] = getattr(
-        import_module("slamreplay.notebook"), stage.__name__.rpartition(".")[2]
-    )
+    # Asked for when somebody calls, not imported: the layers below know nothing of notebooks.
+    root, _, name = stage.__name__.rpartition(".")
+    found: Callable[..., Any] = getattr(import_module(f"{root}.notebook"), name)
     return found
