@@ -363,7 +363,7 @@ def test_runs_are_a_table_and_trajectories(runs):
 
 
 def test_a_report_of_runs_has_their_trials(runs):
-    trials = runs.report(cause=False).trials
+    trials = sr.report(runs, cause=False).trials
 
     assert len(trials) == 4
     assert trials["perturbation"].tolist()[0] is None
@@ -416,7 +416,7 @@ def test_from_a_log_to_runs_of_a_recipe_and_back(tmp_path):
     assert isinstance(again, Runs)
     pd.testing.assert_frame_equal(again.table, runs.table)
     assert again.design.question == "How late may odometry be?"
-    axes = again.report(cause=False).figure("doses")
+    axes = sr.report(again, cause=False).figure("doses")
     assert axes.get_title(loc="left") == "tf_delay.odometry"
     plt.close("all")
     files = sr.export(again, "tum", tmp_path / "tum")

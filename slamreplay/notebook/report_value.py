@@ -233,17 +233,17 @@ class Report:
     def __repr__(self) -> str:
         from slamreplay.notebook.report_text import plain
 
-        return plain(self)
+        return plain(self.content, self.post)
 
     def _repr_html_(self) -> str:
         from slamreplay.notebook.report_text import html
 
-        return html(self)
+        return html(self.content, self.post)
 
     def _repr_markdown_(self) -> str:
         from slamreplay.notebook.report_text import markdown
 
-        return markdown(self)
+        return markdown(self.content, self.post)
 
     @property
     def _start_ns(self) -> int:

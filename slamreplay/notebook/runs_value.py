@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from slamreplay.errors import UsageError
 from slamreplay.notebook.log_bundle import LogBundle
@@ -14,7 +14,6 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from slamreplay.bundle.run import Run
-    from slamreplay.notebook.report_value import Report
     from slamreplay.replay.dose import DoseResults
 
 #: Columns that a cell shows; `table` has them all.
@@ -81,12 +80,6 @@ class Runs:
         if run.estimate is None:
             raise UsageError(f"run {i} is not applicable: {run.not_applicable}")
         return track_frame(run.estimate.track, self.log.manifest.start_ns)
-
-    def report(self, **options: Any) -> Report:
-        """As `sr.report` of them."""
-        from slamreplay.notebook.reporting import report
-
-        return report(self, **options)
 
     def save(self, folder: str | Path) -> Path:
         """Write them as `slamreplay perturb -o` does, the bundle with them.
