@@ -45,6 +45,10 @@ class Registry:
     def __contains__(self, name: object) -> bool:
         return name in self.targets()
 
+    def is_ours(self, name: str) -> bool:
+        """Whether it comes with slamreplay, and not from somebody else's package."""
+        return name in self._builtin
+
     def target(self, name: str) -> str:
         """Where `name` is loaded from, as "module:attribute"; nothing is imported.
 

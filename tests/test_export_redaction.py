@@ -81,7 +81,10 @@ def test_no_text_of_the_manifest_is_left(bundle):
         "sources": [s.model_copy(update={"name": f"{SECRET}.mcap"}) for s in old.sources],
         "options": {"map": f"{SECRET}.yaml", "robot": SECRET},
         "clock": old.clock.model_copy(update={"reason": SECRET}),
-        "roles": [r.model_copy(update={"reason": SECRET}) for r in old.roles],
+        "roles": [
+            *(r.model_copy(update={"reason": SECRET}) for r in old.roles),
+            old.roles[0].model_copy(update={"role": "points", "type": f"{SECRET}_msgs/msg/Eye"}),
+        ],
         "missing": [Missing(part="imu", reason=f"/{SECRET}/imu is empty", consequence="none")],
         "maps": [m.model_copy(update={"source": f"{SECRET}.yaml"}) for m in old.maps],
         "losses": [
@@ -93,7 +96,9 @@ def test_no_text_of_the_manifest_is_left(bundle):
         old.model_copy(update=told), {n: bundle.table(n) for n in TABLES}, bundle.grids()
     )
 
-    text = Redactor(secret).bundle().manifest.model_dump_json()
+    new = Redactor(secret).bundle().manifest
+    assert [r.type for r in new.roles[:-1]] == [r.type for r in old.roles]
+    text = new.model_dump_json()
     assert SECRET not in text
     assert "lost" in text
 

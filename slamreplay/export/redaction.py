@@ -30,6 +30,7 @@ from slamreplay.bundle.track import PoseTrack
 from slamreplay.bundle.view import Bundle
 from slamreplay.export.pseudonyms import Pseudonyms
 from slamreplay.export.said_again import said_again
+from slamreplay.ingest import DECODERS
 from slamreplay.maps.grid import OccupancyGrid
 from slamreplay.verdict.motion import word_of_protection
 
@@ -142,7 +143,7 @@ class Redactor:
                 "options": {},
                 "clock": old.clock.model_copy(update={"reason": "header stamps or log times"}),
                 "frames": _frames(old.frames, names.frame),
-                "roles": [_role(r, names.topic) for r in old.roles],
+                "roles": [_role(r, names) for r in old.roles],
                 "missing": [m.model_copy(update={"reason": "not recorded"}) for m in old.missing],
                 "maps": [_folder(m) for m in maps],
                 "losses": [_loss(x, names.topic) for x in old.losses],
@@ -191,8 +192,15 @@ def _source(source: Source, number: int) -> Source:
 _SUFFIXES = frozenset({".bag", ".mcap", ".db3", ".clf", ".gz", ".bz2", ".yaml", ".pgm", ".png"})
 
 
-def _role(role: Role, topic: Callable[[str], str]) -> Role:
-    return role.model_copy(update={"topic": topic(role.topic), "reason": "as the log has it"})
+def _role(role: Role, names: Pseudonyms) -> Role:
+    # A type that somebody's own decoder reads names its maker.
+    is_common = DECODERS.is_ours(role.type) or role.type.split("/")[0] in _TEXT_LOGS
+    kind = role.type if is_common else f"other/Type{names.number('type', role.type)}"
+    new = {"topic": names.topic(role.topic), "type": kind, "reason": "as the log has it"}
+    return role.model_copy(update=new)
+
+
+_TEXT_LOGS = frozenset({"carmen", "mrclam"})
 
 
 def _folder(entry: MapVersion) -> MapVersion:

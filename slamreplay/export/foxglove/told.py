@@ -24,6 +24,8 @@ _LEVEL: dict[Severity, Log.Level.ValueType] = {
     "warning": Log.WARNING,
     "error": Log.ERROR,
 }
+#: Messages of states in a file, about.
+_MOST_STATES = 20_000
 
 
 def told(shown: Shown) -> Iterator[Stream]:
@@ -66,10 +68,12 @@ def _notes(shown: Shown) -> Stream:
 def _states(shown: Shown) -> Stream:
     """Each state at its start and every second on, the last one at its end, too.
 
-    A plot knows only of the part of a file that its viewer has read.
+    A plot knows only of the part of a file that its viewer has read. A clock that spans years has
+    longer steps.
     """
+    step_ns = max(NS_PER_S, (shown.end_ns - shown.start_ns) // _MOST_STATES)
     for state in shown.states:
-        for t_ns in range(state.start_ns, state.end_ns, NS_PER_S):
+        for t_ns in range(state.start_ns, state.end_ns, step_ns):
             yield t_ns, topics.STATE, _state(state, t_ns)
     if shown.states:
         yield shown.end_ns, topics.STATE, _state(shown.states[-1], shown.end_ns)
