@@ -31,6 +31,7 @@ function drawPlot(context, scene, layout, plot, end, inks) {
   context.lineJoin = "round";
   context.stroke(curve.line);
   context.restore();
+  drawExtreme(context, layout, plot, inks);
   if (lane.limit === null) return;
   const y = plotY(plot, lane.limit);
   context.strokeStyle = inks.ink;
@@ -45,6 +46,20 @@ function drawPlot(context, scene, layout, plot, end, inks) {
   const text = `limit ${laneText(lane, lane.limit)}`;
   const wide = context.measureText(text).width;
   haloed(context, text, layout.right - wide - 2, y < top + 14 ? y + 9 : y - 8, inks, inks.soft);
+}
+
+// The lane's scale: how high its curve goes, of the match how low.
+function drawExtreme(context, layout, plot, inks) {
+  const { lane } = plot;
+  const known = lane.values.filter(Number.isFinite);
+  if (!known.length) return;
+  const [word, pick] = lane.key === "match" ? ["least", Math.min] : ["most", Math.max];
+  const value = known.reduce((a, b) => pick(a, b));
+  const text = `${word} ${laneText(lane, value)}`;
+  context.font = `11px ${inks.font}`;
+  if (layout.narrow) { haloed(context, text, layout.left + 4, plot.top + PLOT - 8, inks, inks.soft); return; }
+  context.fillStyle = inks.soft;
+  context.fillText(text, GUTTER - 12 - context.measureText(text).width, plot.top + PLOT - 9);
 }
 
 // Down from the title's place, in as many lines as the gutter asks for.
