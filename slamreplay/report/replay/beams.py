@@ -30,11 +30,6 @@ class Thinning:
     of_beams: int
     every_beam: int
 
-    @property
-    def is_thinned(self) -> bool:
-        """Whether anything was left out."""
-        return self.scans < self.of_scans or self.every_beam > 1
-
 
 @dataclass(frozen=True, eq=False)
 class PackedScans:
