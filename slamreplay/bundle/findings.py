@@ -1,4 +1,7 @@
-"""A check's answer, and the catalogue of what findings mean."""
+"""A check's answer, and the catalogue of what findings mean.
+
+Long, because the catalogue is: one entry for each finding, and nothing that computes.
+"""
 
 from __future__ import annotations
 

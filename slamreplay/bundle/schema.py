@@ -1,6 +1,7 @@
 """The bundle's tables, column by column: type, unit, frame and meaning.
 
-The texts travel in the Parquet files' own metadata; FORMAT.md is printed from them.
+The texts travel in the Parquet files' own metadata; FORMAT.md is printed from them. Long, because
+the tables are: a line for each column, and nothing that computes.
 """
 
 from __future__ import annotations

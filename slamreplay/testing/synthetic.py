@@ -1,4 +1,7 @@
-"""A bundle made in memory: a robot drives round a small room, and everything about it is known."""
+"""A bundle made in memory: a robot drives round a small room, and everything about it is known.
+
+One module, longer than most: a recipe read from top to bottom, a function for each table.
+"""
 
 from __future__ import annotations
 

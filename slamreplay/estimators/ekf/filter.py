@@ -1,4 +1,7 @@
-"""The filter over a whole log: events in order of time, starts, and starting again when lost."""
+"""The filter over a whole log: events in order of time, starts, and starting again when lost.
+
+A little longer than most: the state of one pass and every step that changes it stand together.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""One scan after another laid onto the map of those before it."""
+"""One scan after another laid onto the map of those before it.
+
+A little longer than most: the state of one pass and every step that changes it stand together.
+"""
 
 from __future__ import annotations
 
