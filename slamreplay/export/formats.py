@@ -84,7 +84,7 @@ def needs(to: Format, only: Only | None, *, covariance: bool = False) -> Needs:
     if covariance and to is not Format.TUM:
         raise UsageError(f"--to {to} takes no --covariance", hint="--to tum does")
     if to is Format.RERUN and find_spec("rerun") is None:
-        raise UsageError("rerun is not installed", hint="pip install 'slamreplay[rerun]'")
+        raise UsageError("rerun is not installed", hint="the extra slamreplay[rerun] has it")
     if only is None:
         return both
     return Needs(only is Only.RECORDED, only is Only.ANALYSIS)
