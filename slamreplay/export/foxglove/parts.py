@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 
 import numpy as np
@@ -23,6 +22,7 @@ from numpy.typing import ArrayLike
 
 from slamreplay.evidence.colours import rgb
 from slamreplay.geometry.se2 import Array
+from slamreplay.geometry.se3 import quaternion_from_yaw
 from slamreplay.geometry.times import NS_PER_S
 
 #: A message on its way into the file: time, topic, content.
@@ -43,7 +43,8 @@ def stamp(t_ns: int) -> Timestamp:
 
 def quaternion(yaw: float) -> Quaternion:
     """A turn about z."""
-    return Quaternion(z=math.sin(yaw / 2.0), w=math.cos(yaw / 2.0))
+    x, y, z, w = quaternion_from_yaw(yaw).tolist()
+    return Quaternion(x=x, y=y, z=z, w=w)
 
 
 def pose(xyyaw: Array, z_m: float = 0.0) -> Pose:

@@ -21,6 +21,7 @@ from slamreplay.export.rerun.batches import (
 from slamreplay.export.rerun.sink import Sink
 from slamreplay.export.shown import Shown
 from slamreplay.geometry.se2 import Array
+from slamreplay.geometry.se3 import quaternion_from_yaw
 
 #: Of what lies over the map. Below one: an opaque picture is black where it is transparent.
 _OPACITY = 0.999
@@ -67,7 +68,7 @@ def _send_grid(
         format=[form],
         cell_size=[cell_m],
         translation=[[x, y, -0.03 + 0.01 * over]],
-        quaternion=[[0.0, 0.0, np.sin(yaw / 2.0), np.cos(yaw / 2.0)]],
+        quaternion=quaternion_from_yaw([yaw]),
         opacity=[_OPACITY if over else 1.0],
         draw_order=[float(over)],
     )

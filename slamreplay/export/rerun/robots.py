@@ -23,6 +23,7 @@ from slamreplay.export.rerun.batches import (
 )
 from slamreplay.export.rerun.sink import Sink
 from slamreplay.export.shown import Shown, poses_at
+from slamreplay.geometry.se3 import quaternion_from_yaw
 
 _BEAMS = np.array([rgba(colours.BEAMS[met]) for met in sorted(Met)], dtype=np.uint32)
 
@@ -49,8 +50,7 @@ def draw_robots(shown: Shown, sink: Sink) -> None:
 def _draw_robot(entity: str, track: PoseTrack, colour: str, shown: Shown, sink: Sink) -> None:
     """Its pose is a transform, so that its outline and its scans, which lie below, move along."""
     known = track.take(track.has_pose)
-    half = known.xyyaw[:, 2] / 2.0
-    turn = np.column_stack([np.zeros((len(known), 2)), np.sin(half), np.cos(half)])
+    turn = quaternion_from_yaw(known.xyyaw[:, 2])
     place = np.column_stack([known.xyyaw[:, :2], np.zeros(len(known))])
     sink.send(entity, known.t_ns, rr.Transform3D.columns(translation=place, quaternion=turn))
     sink.always(f"{entity}/heading", rr.Arrows3D(vectors=[[0.6, 0, 0]], colors=[rgba(colour)]))
