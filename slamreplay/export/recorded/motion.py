@@ -58,11 +58,7 @@ def _odometry(topic: str, rows: Rows, ros: Composer) -> Stream:
             header=ros.header(stamps[i], t["frame_id"][i]),
             child_frame_id=t["child_frame_id"][i],
             pose=ros.pose_with_covariance_of(place[i], turn[i], pose_cov[i]),
-            twist=ros.make(
-                "geometry_msgs/TwistWithCovariance",
-                twist=ros.twist_of(linear[i], angular[i]),
-                covariance=twist_cov[i],
-            ),
+            twist=ros.twist_with_covariance_of(linear[i], angular[i], twist_cov[i]),
         )
 
     return Stream(topic, "nav_msgs/Odometry", rows.t_log_ns, message)
@@ -124,11 +120,7 @@ def _velocity(topic: str, rows: Rows, ros: Composer) -> Stream:
         return ros.make(
             "geometry_msgs/TwistWithCovarianceStamped",
             header=ros.header(stamps[i], t["frame_id"][i]),
-            twist=ros.make(
-                "geometry_msgs/TwistWithCovariance",
-                twist=ros.twist_of(linear[i], angular[i]),
-                covariance=covariance[i],
-            ),
+            twist=ros.twist_with_covariance_of(linear[i], angular[i], covariance[i]),
         )
 
     return Stream(topic, "geometry_msgs/TwistWithCovarianceStamped", rows.t_log_ns, message)

@@ -54,9 +54,7 @@ def _posed(topic: str, rows: Rows, ros: Composer, missed: list[NotAsRecorded]) -
         return pose_stream(topic, rows, ros)
     stamps, covariance = header_stamps(t), given(t["covariance"])
     place, turn = t["position_xyz"].tolist(), t["orientation_xyzw"].tolist()
-    still = ros.make(
-        "geometry_msgs/TwistWithCovariance", twist=ros.twist(0.0, 0.0), covariance=np.zeros(36)
-    )
+    still = ros.twist_with_covariance_of([0.0] * 3, [0.0] * 3, np.zeros(36))
 
     def message(i: int) -> Any:
         return ros.make(

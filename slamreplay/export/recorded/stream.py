@@ -62,6 +62,13 @@ class Composer(Messages):
         pose = self.pose_of(position, orientation)
         return self.make("geometry_msgs/PoseWithCovariance", pose=pose, covariance=covariance)
 
+    def twist_with_covariance_of(
+        self, linear: Sequence[float], angular: Sequence[float], covariance: NDArray
+    ) -> Any:
+        """geometry_msgs/TwistWithCovariance of velocities and a covariance (36,), as ROS has it."""
+        twist = self.twist_of(linear, angular)
+        return self.make("geometry_msgs/TwistWithCovariance", twist=twist, covariance=covariance)
+
     def planar(self, xyyaw: NDArray[np.float64]) -> list[Any]:
         """geometry_msgs/Pose of each of (N, 3) planar poses."""
         turns = se3.quaternion_from_yaw(xyyaw[:, 2]).tolist()
