@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -29,14 +31,8 @@ def scene_clouds(post: Postmortem, view: BundleView, most: int | None) -> SceneC
         view: the log.
         most: clouds at the most; None for all of them, whole.
     """
-    table = view.role("particles")
-    if table is None:
-        return None
     times, clouds = [], []
-    for row in _rows(table, most):
-        frame = _frame_on_map(post, view, table, row)
-        if frame is None:
-            continue
+    for table, row, frame in _placed(post, view, "particles", most):
         particles, share = sound_particles(table["xyyaw"][row], table["weights"][row])
         if most is not None and len(particles) > MOST_PARTICLES:
             at = (np.arange(MOST_PARTICLES) + 0.5) / MOST_PARTICLES
@@ -56,14 +52,8 @@ def scene_plans(post: Postmortem, view: BundleView, most: int | None) -> ScenePl
         view: the log.
         most: plans at the most; None for all of them with every point.
     """
-    table = view.role("plan")
-    if table is None:
-        return None
     times, plans = [], []
-    for row in _rows(table, most):
-        frame = _frame_on_map(post, view, table, row)
-        if frame is None:
-            continue
+    for table, row, frame in _placed(post, view, "plan", most):
         xy = table["xyyaw"][row].reshape(-1, 3)[:, :2]
         xy = xy[np.isfinite(xy).all(axis=1)]
         if most is not None and len(xy) > MOST_POINTS:
@@ -75,10 +65,18 @@ def scene_plans(post: Postmortem, view: BundleView, most: int | None) -> ScenePl
     return ScenePlans(_times(times), _firsts(plans), np.concatenate(plans))
 
 
-def _rows(table: Table, most: int | None) -> list[int]:
+def _placed(
+    post: Postmortem, view: BundleView, role: str, most: int | None
+) -> Iterator[tuple[Table, int, se2.Array]]:
+    """Rows of a role by time, at most so many, each with where its frame lies in the map (3,)."""
+    table = view.role(role)
+    if table is None:
+        return
     order = np.argsort(table.t_ns, kind="stable")
-    rows: list[int] = order[chosen(table.t_ns[order], (), most)].tolist()
-    return rows
+    for row in order[chosen(table.t_ns[order], (), most)].tolist():
+        frame = _frame_on_map(post, view, table, row)
+        if frame is not None:
+            yield table, row, frame
 
 
 def _frame_on_map(post: Postmortem, view: BundleView, table: Table, row: int) -> se2.Array | None:
