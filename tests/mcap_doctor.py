@@ -44,9 +44,9 @@ class Doctor:
             if not isinstance(record, MessageIndex):
                 assert self.indexed == self.in_chunk  # every message has its entry in an index
             match record:
-                case Header():
-                    assert record.library
-                    assert record.profile in ("", "ros1", "ros2")
+                case Header(library=library, profile=profile):
+                    assert library
+                    assert profile in ("", "ros1", "ros2")
                 case Chunk():
                     self.examine_chunk(record)
                 case MessageIndex():

@@ -6,11 +6,11 @@ import sys
 from pathlib import Path
 
 import pytest
+from heavy_modules import HEAVY
 
 import slamreplay
 from slamreplay.cli import main as cli
 
-HEAVY = ("numpy", "pandas", "scipy", "numba", "gtsam", "open3d", "matplotlib", "rosbags", "pyarrow")
 PROGRAM = [str(Path(sys.executable).with_name("slamreplay"))]
 
 

@@ -1,0 +1,3 @@
+"""What no command may import before it works: each takes a large part of a second."""
+
+HEAVY = ("numpy", "pandas", "scipy", "numba", "gtsam", "open3d", "matplotlib", "rosbags", "pyarrow")
