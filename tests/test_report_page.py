@@ -22,6 +22,7 @@ from slamreplay.ingest.pipeline import ingest
 from slamreplay.postmortem import postmortem
 from slamreplay.report.audit_tables import edges, streams
 from slamreplay.report.cells import MOST_ROWS, table
+from slamreplay.report.facts import deciding_facts
 from slamreplay.report.figures.canvas import FAINT, INK
 from slamreplay.report.figures.neutral import DARK_PAPER, dark_of
 from slamreplay.report.finding_rows import MOST_FINDINGS
@@ -190,6 +191,14 @@ def test_nothing_on_the_page_runs_loads_or_styles_inline(pages):
             digest = base64.b64encode(hashlib.sha256(style.encode()).digest()).decode()
             assert f"'sha256-{digest}'" in policy
             assert not re.search(r"@import|https?:|url\((?!#)", style)
+
+
+def test_a_fact_without_a_number_has_no_label_of_one(posts):
+    for post in posts.values():
+        facts = deciding_facts(post)
+        labels = re.findall(r"<li[^>]*><strong>[^<]*</strong>(<em>)?", html(post))
+        assert [bool(label) for label in labels] == [fact.is_known for fact in facts]
+    assert not all(fact.is_known for fact in deciding_facts(posts["bare"]))
 
 
 def test_what_was_counted_may_be_all_of_it_and_no_belief_is_certain():
