@@ -1,0 +1,1 @@
+"""Post-mortems of many logs on one machine or many, and a folder that is watched for new ones."""

@@ -1,0 +1,67 @@
+"""What a gate demands of every log: what must be found, what must not, and how far numbers go."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from slamreplay.bundle.findings import Severity
+
+
+@dataclass(frozen=True)
+class Limit:
+    """How far a number may go.
+
+    Attributes:
+        metric: its name, with the unit in it.
+        maximum: it fails above this; None without one.
+        minimum: it fails below this; None without one.
+        clear: hysteresis, as of a Schmitt trigger: once it failed it holds again only when it is
+            back on this side of `clear`. Of a number over time that is within the log, of a number
+            per log it is from one run to the next, by the baseline. None: the limit itself.
+        for_s: of a number over time, how long it must stay beyond the limit to fail, s.
+    """
+
+    metric: str
+    maximum: float | None = None
+    minimum: float | None = None
+    clear: float | None = None
+    for_s: float = 0.0
+
+
+@dataclass(frozen=True)
+class Rules:
+    """The demands on one log.
+
+    Attributes:
+        expect: ids of findings and `state=NAME`, `failure_mode=NAME` that must be there.
+        forbid: the same, that must not; SR-LOC-* names all of a kind.
+        max_severity: the worst that a finding may have which nobody expects; None allows all.
+        limits: on numbers.
+    """
+
+    expect: tuple[str, ...] = ()
+    forbid: tuple[str, ...] = ()
+    max_severity: Severity | None = "warning"
+    limits: tuple[Limit, ...] = ()
+
+
+@dataclass(frozen=True)
+class Demands:
+    """A whole recipe of a gate.
+
+    Attributes:
+        question: in one sentence.
+        rules: for every log.
+        of_logs: by glob pattern of a log's name, rules that take their place for it; the first
+            pattern that fits counts.
+        estimators: run again on every log, so that their numbers can be limited, too, as
+            `amcl.error_max_m`.
+        seeds: how often each of them runs.
+    """
+
+    question: str
+    rules: Rules
+    of_logs: Mapping[str, Rules] = field(default_factory=dict)
+    estimators: tuple[str, ...] = ()
+    seeds: int = 1
