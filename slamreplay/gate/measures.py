@@ -6,9 +6,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
+from scipy.special import stdtrit
 
+from slamreplay.consistency.statistics.effective_samples import effective_samples
 from slamreplay.geometry import se2
+from slamreplay.verdict.latency.spread import spread
 
 
 @dataclass(frozen=True)
@@ -64,3 +67,35 @@ class Measures:
     values: Mapping[str, Measure]
     series: Mapping[str, Series] = field(default_factory=dict)
     missing: Mapping[str, str] = field(default_factory=dict)
+
+
+#: A number, or why there is none.
+Answer = Measure | str
+
+
+def mean_of(values: ArrayLike, unit: str, most: float | None = None) -> Measure:
+    """The mean of numbers (N,) in time order, NaN left out, with its 95 % interval.
+
+    Student's t for the effective number of samples: their scatter about their own mean is smaller
+    than that about the true one by (n_eff - 1) / n_eff. None below two effective samples.
+
+    Args:
+        values: not negative, one of them finite.
+        unit: of them.
+        most: what none of them can be above; None where there is no such number.
+    """
+    x = np.asarray(values, dtype=np.float64)
+    x = x[np.isfinite(x)]
+    mean, n_eff = float(x.mean()), effective_samples(x)
+    if n_eff < 2.0:
+        return Measure(mean, unit, n_eff=n_eff)
+    half = float(stdtrit(n_eff - 1.0, 0.975) * x.std() / np.sqrt(n_eff - 1.0))
+    high = mean + half if most is None else min(most, mean + half)
+    return Measure(mean, unit, max(0.0, mean - half), high, n_eff)
+
+
+def p95_of(values: ArrayLike, unit: str) -> Measure:
+    """What 95 of 100 numbers (N,) in time order are below, with its interval as of `spread`."""
+    told = spread(values)
+    assert told.p95 is not None
+    return Measure(told.p95, unit, told.p95_low, told.p95_high, told.n_eff)
