@@ -48,7 +48,7 @@ def run_recipe(path: Path, output: Path, given: Given, *, as_json: bool) -> None
     from slamreplay.cli.budget import run_budget
     from slamreplay.cli.dose import run_design
     from slamreplay.cli.lab import run_lab
-    from slamreplay.recipes import BudgetRecipe, LabRecipe, read_recipe
+    from slamreplay.recipes import BudgetRecipe, GateRecipe, LabRecipe, read_recipe
 
     recipe = read_recipe(path)
     of_runs = {
@@ -57,6 +57,9 @@ def run_recipe(path: Path, output: Path, given: Given, *, as_json: bool) -> None
         "--parameters": given.parameters,
     }
     names = [name for name, value in of_runs.items() if value]
+    if isinstance(recipe, GateRecipe):
+        raise UsageError("it is a gate, which perturbs nothing", where=path,
+                         hint=f"slamreplay gate LOG... --recipe {path}")  # fmt: skip
     if isinstance(recipe, LabRecipe):
         foreign = [*(["LOG"] if given.logs else []), *names, *given.of_logs]
         run_lab(recipe, path, output, seed=given.seed, given=foreign, as_json=as_json)

@@ -23,7 +23,9 @@ def deed_numbers(post: Postmortem) -> Iterator[tuple[str, Answer]]:
     else:
         yield "recoveries", "recoveries were not recorded"
     yield "needless_recoveries", _needless(recoveries, recorded=recorded)
-    weighed = [a.allowed for a in post.judgement.actions if a.allowed is not None]
+    # Motions stand for themselves: the recoveries that are inferred from them would count twice.
+    told = [a for a in post.judgement.actions if not a.inferred]
+    weighed = [a.allowed for a in told if a.allowed is not None]
     yield (
         "risky_actions",
         (_count(weighed.count(False)) if weighed else "of no action the room it had is known"),

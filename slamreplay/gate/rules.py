@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from pathlib import PurePosixPath
 
 from slamreplay.bundle.findings import Severity
 
@@ -34,16 +35,19 @@ class Rules:
     """The demands on one log.
 
     Attributes:
-        expect: ids of findings and `state=NAME`, `failure_mode=NAME` that must be there.
-        forbid: the same, that must not; SR-LOC-* names all of a kind.
+        expect: ids of findings and `state=NAME`, `failure_mode=NAME`, `root_cause=NAME` that must
+            be there; of SR-LOC-* one of its kind.
+        forbid: the same, that must not; of SR-LOC-* all of its kind but those that are expected.
         max_severity: the worst that a finding may have which nobody expects; None allows all.
         limits: on numbers.
+        require_assessable: a log fails of which nothing of all this could be assessed.
     """
 
     expect: tuple[str, ...] = ()
     forbid: tuple[str, ...] = ()
     max_severity: Severity | None = "warning"
     limits: tuple[Limit, ...] = ()
+    require_assessable: bool = True
 
 
 @dataclass(frozen=True)
@@ -53,8 +57,9 @@ class Demands:
     Attributes:
         question: in one sentence.
         rules: for every log.
-        of_logs: by glob pattern of a log's name, rules that take their place for it; the first
-            pattern that fits counts.
+        of_logs: by glob pattern, rules that take their place for a log; the first pattern that
+            fits counts. One without a slash is of the file's name, one with slashes of as many
+            last parts of its path.
         estimators: run again on every log, so that their numbers can be limited, too, as
             `amcl.error_max_m`.
         seeds: how often each of them runs.
@@ -65,3 +70,8 @@ class Demands:
     of_logs: Mapping[str, Rules] = field(default_factory=dict)
     estimators: tuple[str, ...] = ()
     seeds: int = 1
+
+    def rules_of(self, log: str) -> Rules:
+        """Those for one log, by its path with forward slashes."""
+        path = PurePosixPath(log)
+        return next((r for glob, r in self.of_logs.items() if path.match(glob)), self.rules)

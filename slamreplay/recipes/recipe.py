@@ -11,12 +11,14 @@ from slamreplay.labs import LABS
 from slamreplay.plain_yaml import read_plain_yaml
 from slamreplay.recipes.budget import BudgetFile, BudgetRecipe, budget_recipe
 from slamreplay.recipes.dose_recipe import DoseFile, DoseRecipe, dose_recipe
+from slamreplay.recipes.gate_recipe import KEYS as GATE_KEYS
+from slamreplay.recipes.gate_recipe import GateFile, GateRecipe, gate_recipe
 from slamreplay.recipes.lab_recipe import LabFile, LabRecipe, lab_recipe
 from slamreplay.recipes.validation import unknown_key
 
 VERSION = 1
 
-Recipe = LabRecipe | DoseRecipe | BudgetRecipe
+Recipe = LabRecipe | DoseRecipe | BudgetRecipe | GateRecipe
 #: The key that only one kind has, and who reads it.
 _KINDS: dict[str, Callable[[Mapping[str, Any], Path], Recipe]] = {
     "lab": lab_recipe,
@@ -27,6 +29,8 @@ _KINDS: dict[str, Callable[[Mapping[str, Any], Path], Recipe]] = {
 
 def read_recipe(path: Path) -> Recipe:
     """The recipe in a YAML file: `lab`, `perturbations` (a design) or `budget` is its kind.
+
+    One that has none of these, but what a gate demands, is a gate.
 
     Raises:
         UsageError: no plain YAML, another version, a name or a key that there is not, or a value
@@ -43,7 +47,10 @@ def read_recipe(path: Path) -> Recipe:
                          hint="a recipe asks one question")  # fmt: skip
     if kinds:
         return _KINDS[kinds[0]](given, path)
-    known = {**LabFile.model_fields, **DoseFile.model_fields, **BudgetFile.model_fields}
+    if any(key in given for key in GATE_KEYS):
+        return gate_recipe(given, path)
+    known = {**LabFile.model_fields, **DoseFile.model_fields, **BudgetFile.model_fields,
+             **GateFile.model_fields}  # fmt: skip
     for key in given:
         if key not in known:
             what, hint = unknown_key(key, known)
@@ -51,5 +58,5 @@ def read_recipe(path: Path) -> Recipe:
     raise UsageError(
         "the key 'lab', 'perturbations' or 'budget' is missing", where=path,
         hint=f"lab: one of {', '.join(LABS)}; perturbations: a list of name and levels; budget: "
-        "rates and stages",
+        "rates and stages; expect, forbid or limits: of a gate",
     )  # fmt: skip
