@@ -26,3 +26,16 @@ def straight(text: str) -> str:
 def as_markdown(text: str) -> str:
     """Markdown that shows the text as it is: what a log wrote is no markup."""
     return _MARKS.sub(r"\\\g<0>", text)
+
+
+def one_line(text: str, most: int) -> str:
+    """The text, clean and straight, on one line of at most `most` letters.
+
+    Every kind of line end becomes a space: no part of a log's text begins a line of its own.
+    """
+    # Far more than is shown is not looked at: a log may hold a megabyte in one text.
+    line = " ".join(straight(clean(text[: 4 * most])).split())
+    if len(line) <= most and len(text) <= 4 * most:
+        return line
+    left_out = f"... ({len(text)} letters in all)"
+    return line[: most - len(left_out)] + left_out
