@@ -15,6 +15,10 @@ if TYPE_CHECKING:
 #: Edge of a cell of `places`, m; cell (col, row) is [col, col + 1) x [row, row + 1) of it.
 PLACE_M = 1.0
 
+#: Sums of `places` are multiples of this (2^-10), s and m2: then sums over any number of logs, in
+#: any order, are exact in float64, and the same in every program.
+STEP = 1.0 / 1024.0
+
 _KEY = {"key": ("string", "", "the log and how it was read")}
 _SPAN = {
     "start_ns": ("int64", "ns", "on the clock of the log"),
