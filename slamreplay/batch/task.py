@@ -17,11 +17,12 @@ class LogFile:
     """One file of a log.
 
     Attributes:
-        url: as fsspec takes it; a local one is an absolute path.
+        url: as fsspec takes it; a local one is an absolute path. It may hold a password or a
+            signature: what people see is `LogSource.log`.
         name: from the log's own place: of a folder of rosbag2 the path within it.
         size: in bytes, None where the store does not tell.
-        version: what changes with the content as the store tells it (ETag, or mtime in ns), empty
-            where it does not.
+        version: what changes with the content: of a local file `local_files.fingerprint`, of
+            another the ETag or the time of its last change, empty where the store tells neither.
     """
 
     url: str
@@ -36,11 +37,13 @@ class LogSource:
 
     Attributes:
         log: its path or address as shown to people.
-        files: one for a container, several for a folder of rosbag2 or a split log.
+        files: one for a container (a database's write-ahead log comes after it), several for a
+            folder of rosbag2 or MRCLAM or a bundle.
         labels: site, robot, software and the like, by name.
         map: address of its map's yaml, None where it has its own or none.
         topics: address of its topics file, None for a choice by looks.
         robot: namespace of the robot to look at.
+        folder: its name where the log is a folder, else empty.
     """
 
     log: str
@@ -49,6 +52,7 @@ class LogSource:
     map: str | None = None
     topics: str | None = None
     robot: str | None = None
+    folder: str = ""
 
 
 @dataclass(frozen=True)
@@ -56,14 +60,15 @@ class LogTask:
     """A log to be looked back on.
 
     Attributes:
-        key: 32 hex digits over the files' addresses and versions and over all options: the log and
-            how it is read. What has this key already is not done again.
+        key: 32 hex digits: the log and how it is read, as of `keys.key_of`. What has this key
+            already is not done again.
         source: the log.
         cause: replay what went wrong, as of `postmortem`.
         demands: of a gate, None without one.
         storage: options of fsspec for the source's addresses.
-        named: file name patterns and text of small files the task needs beside the log (the map,
-            its image, the topics file), read by the client: workers need not reach them.
+        named: content by path of the small files the task needs beside the log, read by the client,
+            so that workers need not reach them: `map/NAME.yaml` and its image, `topics/NAME.yaml`.
+            `named.placed` puts them into a folder.
     """
 
     key: str

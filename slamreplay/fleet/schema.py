@@ -15,11 +15,16 @@ if TYPE_CHECKING:
 #: Edge of a cell of `places`, m; cell (col, row) is [col, col + 1) x [row, row + 1) of it.
 PLACE_M = 1.0
 
+#: Sums of `places` are multiples of this (2^-10), s and m2: then sums over any number of logs, in
+#: any order, are exact in float64, and the same in every program.
+STEP = 1.0 / 1024.0
+
 _KEY = {"key": ("string", "", "the log and how it was read")}
 _SPAN = {
     "start_ns": ("int64", "ns", "on the clock of the log"),
     "end_ns": ("int64", "ns", "on the clock of the log"),
 }
+_MAP = {"map_version": ("string", "", "hash of the map whose frame it is in")}
 _BOX = {
     "x_min_m": ("double", "m", "in the frame of the map"),
     "y_min_m": ("double", "m", "in the frame of the map"),
@@ -48,6 +53,7 @@ TABLES: dict[str, dict[str, tuple[str, str, str]]] = {
         "failure_mode": ("string", "", "how it began"),
         "root_cause": ("string", "", "what reproduces it; null where nothing does"),
         "lost_s": ("double", "s", "time the robot was lost"),
+        "lost_times": ("int32", "", "how often it became lost"),
         "changed_s": ("double", "s", "time the map was changed"),
         "judged_s": ("double", "s", "time that could be judged"),
         "max_error_m": ("double", "m", "of the belief, greatest"),
@@ -83,6 +89,7 @@ TABLES: dict[str, dict[str, tuple[str, str, str]]] = {
     },
     "regions": {
         **_KEY,
+        **_MAP,
         "kind": ("string", "", "appeared, removed or moved"),
         **_BOX,
         "area_m2": ("double", "m2", ""),
@@ -93,6 +100,7 @@ TABLES: dict[str, dict[str, tuple[str, str, str]]] = {
     },
     "stops": {
         **_KEY,
+        **_MAP,
         "t_ns": ("int64", "ns", "on the clock of the log"),
         "x_m": ("double", "m", "in the frame of the map"),
         "y_m": ("double", "m", "in the frame of the map"),
@@ -101,6 +109,7 @@ TABLES: dict[str, dict[str, tuple[str, str, str]]] = {
     },
     "places": {
         **_KEY,
+        **_MAP,
         "col": ("int32", "", "x from col to col + 1 edges of a place, in the frame of the map"),
         "row": ("int32", "", "y likewise"),
         "here_s": ("double", "s", "time the robot was there, by hindsight"),

@@ -1,0 +1,239 @@
+"""The workers of a batch: processes of this machine, or a cluster of dask that exists."""
+
+from __future__ import annotations
+
+import logging
+import pkgutil
+import platform
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from slamreplay.errors import SlamreplayError, UsageError
+from slamreplay.version import __version__
+
+if TYPE_CHECKING:
+    from distributed import Client
+
+#: How long a scheduler is looked for, and how long a worker of it is waited for, s.
+_CONNECT_S, _FIRST_WORKER_S = 10.0, 60.0
+#: How long is enough for saying goodbye, s.
+_CLOSE_S = 10.0
+_NUMBER = "slamreplay.version:__version__"
+
+#: For workers of our own. What they hold is small: a log's memory is that of the program, which
+#: spilling cannot free and pausing would only stop for ever. `allowed-failures`: who died of what
+#: is judged by us, see `loop`. The profiler of dask keeps stacks for a dashboard that is off.
+_LOCAL = {
+    "distributed.worker.memory.target": False,
+    "distributed.worker.memory.spill": False,
+    "distributed.worker.memory.pause": False,
+    "distributed.worker.memory.terminate": 0.95,
+    "distributed.worker.profile.enabled": False,
+    "distributed.scheduler.allowed-failures": 0,
+    "distributed.scheduler.worker-ttl": None,
+    "distributed.admin.low-level-log-length": 100,
+    "distributed.admin.large-graph-warning-threshold": "1GiB",
+}
+
+
+class ClusterError(SlamreplayError):
+    """A cluster that cannot be reached, lacks the program, or went away."""
+
+
+@dataclass(frozen=True)
+class Workers:
+    """Who does the work.
+
+    Attributes:
+        count: processes on this machine; None is one per core.
+        memory_limit: of each of them, bytes or as dask takes it (`4GiB`); None is an even share of
+            the machine's.
+        scheduler: address of a dask scheduler whose workers do it instead.
+    """
+
+    count: int | None = None
+    memory_limit: str | None = None
+    scheduler: str | None = None
+
+    def checked(self) -> Workers:
+        """The same.
+
+        Raises:
+            UsageError: a count, a limit or an address that makes no sense.
+        """
+        if self.count is not None and self.count < 1:
+            raise UsageError(f"{self.count} workers do no work", hint="--workers 1 or more")
+        if self.scheduler is not None and (self.count is not None or self.memory_limit is not None):
+            raise UsageError(
+                "--workers and --memory-limit are for workers of this machine",
+                hint="those of a --scheduler are started with their own",
+            )
+        if self.memory_limit is not None:
+            _bytes(self.memory_limit)
+        return self
+
+
+@contextmanager
+def connected(workers: Workers, scratch: Path) -> Iterator[Client]:
+    """A client of the workers; those of this machine live as long as the block.
+
+    Args:
+        workers: who they are.
+        scratch: an empty folder for what workers of this machine write.
+
+    Raises:
+        ClusterError: nobody answers at the address, or somebody with other versions.
+        UsageError: the address is none.
+    """
+    with _quiet():
+        client = (
+            _local(workers, scratch)
+            if workers.scheduler is None
+            else _reached(workers.scheduler, _CONNECT_S)
+        )
+        try:
+            yield client
+        finally:
+            _close(client)
+
+
+def _local(workers: Workers, scratch: Path) -> Client:
+    import dask
+    from distributed import Client, LocalCluster
+
+    limit = {} if workers.memory_limit is None else {"memory_limit": workers.memory_limit}
+    with dask.config.set(_LOCAL):
+        cluster = LocalCluster(
+            n_workers=workers.count,
+            threads_per_worker=1,
+            processes=True,
+            dashboard_address=None,
+            silence_logs=logging.CRITICAL + 1,
+            local_directory=str(scratch),
+            env={"NUMBA_NUM_THREADS": "1"},
+            preload=["slamreplay.batch.own_worker"],
+            **limit,
+        )
+        return Client(cluster)
+
+
+def _reached(address: str, patience_s: float) -> Client:
+    from distributed import Client
+
+    try:
+        client = Client(address, timeout=patience_s, set_as_default=False)
+    except ValueError as error:
+        raise UsageError(
+            f"'{address}' is no address of a scheduler", hint="--scheduler tcp://HOST:8786"
+        ) from error
+    except OSError as error:
+        raise ClusterError(
+            f"no scheduler answers at {address} within {patience_s:g} s",
+            hint="start one with `dask scheduler`, and `dask worker ADDRESS` beside it",
+        ) from error
+    try:
+        _check_versions(client, address)
+    except BaseException:
+        _close(client)
+        raise
+    return client
+
+
+def _check_versions(client: Client, address: str) -> None:
+    """Whether the other side runs what this side runs: pickles and results depend on it."""
+    try:
+        client.wait_for_workers(1, timeout=_FIRST_WORKER_S)
+    except TimeoutError as error:
+        raise ClusterError(
+            f"the scheduler at {address} has no worker after {_FIRST_WORKER_S:g} s",
+            hint=f"start some with `dask worker {address} --nthreads 1`",
+        ) from error
+    told = client.get_versions()
+    ours = {"python": platform.python_version(), **_packages(told["client"])}
+    others = {"the scheduler": told["scheduler"], **told["workers"]}
+    for name, versions in others.items():
+        if versions is None:
+            continue
+        theirs = {
+            "python": str(versions["host"]["python"]).split(".final")[0],
+            **_packages(versions),
+        }
+        for package, version in ours.items():
+            if _differs(package, theirs.get(package), version):
+                raise ClusterError(
+                    f"{name} runs {package} {theirs.get(package)}, this program {version}",
+                    hint="the same image or environment on both sides",
+                )
+    for name, number in _numbers(client).items():
+        if number != __version__:
+            said = "has no slamreplay" if number is None else f"runs slamreplay {number}"
+            raise ClusterError(
+                f"{name} {said}, this program is {__version__}",
+                hint=f"install slamreplay {__version__} where the workers run",
+            )
+
+
+def _packages(versions: Mapping[str, Any]) -> dict[str, str]:
+    return {name: str(versions["packages"].get(name)) for name in ("dask", "distributed")}
+
+
+def _differs(package: str, theirs: str | None, ours: str) -> bool:
+    if package == "python":  # pickles hold from one patch to the next
+        return str(theirs).split(".")[:2] != ours.split(".")[:2]
+    return theirs != ours
+
+
+def _numbers(client: Client) -> dict[str, str | None]:
+    """Version of slamreplay by worker and of the scheduler, None where there is none."""
+    # A function of Python's own, for one of ours could not even be sent to who lacks us.
+    told = client.run(pkgutil.resolve_name, _NUMBER, on_error="return")
+    with suppress(ModuleNotFoundError):
+        told["the scheduler"] = client.run_on_scheduler(pkgutil.resolve_name, _NUMBER)
+    told.setdefault("the scheduler", None)
+    return {name: v if isinstance(v, str) else None for name, v in told.items()}
+
+
+def _close(client: Client) -> None:
+    """Say goodbye; who is gone already hears none."""
+    cluster = client.cluster
+    with suppress(Exception):
+        client.close(timeout=_CLOSE_S)
+    if cluster is not None:
+        with suppress(Exception):
+            cluster.close(timeout=_CLOSE_S)
+
+
+def _bytes(text: str) -> int:
+    from dask.utils import parse_bytes
+
+    try:
+        size = int(parse_bytes(text))
+    except (ValueError, TypeError) as error:
+        raise UsageError(f"'{text}' is no size", hint="--memory-limit 4GiB") from error
+    if size < 1 << 20:
+        raise UsageError(f"{text} is too little for any log", hint="--memory-limit 4GiB")
+    return size
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """What dask, tornado and asyncio say to a log is no line of ours."""
+    import distributed  # noqa: F401 - it sets its own loggers up when it is imported
+
+    names = ("distributed", "tornado", "asyncio", "bokeh")
+    loggers = [
+        logging.getLogger(name)
+        for name in [*names, *logging.root.manager.loggerDict]
+        if name.split(".")[0] in names
+    ]
+    before = [logger.disabled for logger in loggers]
+    for logger in loggers:
+        logger.disabled = True
+    try:
+        yield
+    finally:
+        for logger, was in zip(loggers, before, strict=True):
+            logger.disabled = was

@@ -1,0 +1,75 @@
+"""What a worker gave back becomes part of the batch's folder: all of it, or nothing that counts."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from slamreplay.batch.folder import map_folder
+from slamreplay.batch.task import LogResult
+from slamreplay.bundle.atomic import atomic_folder
+from slamreplay.fleet.store import commit, read
+from slamreplay.report.writer import MARKER
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+_MAP_MARKER = "map.yaml"
+
+
+@dataclass(frozen=True)
+class Fate:
+    """What became of a log.
+
+    Attributes:
+        state: of its verdict; None of one that failed.
+        error: why it failed, in one line; None of one that did not.
+    """
+
+    state: str | None
+    error: str | None
+
+
+def commit_result(target: Path, result: LogResult) -> None:
+    """Keep a result. Its rows come last: a log without them is done again, one with them is whole.
+
+    Args:
+        target: folder of the batch.
+        result: of a log, failed ones included.
+
+    Raises:
+        OutputError: the place cannot be written.
+    """
+    (row,) = result.tables["logs"].to_pylist()
+    if result.files:
+        _write(target / row["report"], result.files, MARKER)
+    if result.map_files:
+        place = target / map_folder(row["map_version"])
+        if not (place / _MAP_MARKER).exists():
+            _write(place, result.map_files, _MAP_MARKER)
+    commit(target, result.tables)
+
+
+def fates(target: Path) -> dict[str, Fate]:
+    """What became of every log that the folder has, by key."""
+    return _fates(read(target, "logs"))
+
+
+def fate_of(result: LogResult) -> Fate:
+    """What became of the log of a result."""
+    return _fates(result.tables["logs"])[result.key]
+
+
+def _fates(logs: pa.Table) -> dict[str, Fate]:
+    columns = (logs.column(name).to_pylist() for name in ("key", "state", "error"))
+    return {key: Fate(state, error) for key, state, error in zip(*columns, strict=True)}
+
+
+def _write(folder: Path, files: Mapping[str, bytes], marker: str) -> None:
+    with atomic_folder(folder, marker=marker) as work:
+        for name, content in files.items():
+            place = work / name
+            place.parent.mkdir(parents=True, exist_ok=True)
+            place.write_bytes(content)

@@ -1,0 +1,74 @@
+"""The folder of a batch: what lies where in it, and who may write to it."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from slamreplay.batch.lock import held_lock
+from slamreplay.batch.task import LogTask
+from slamreplay.bundle.atomic import check_target, write_file
+from slamreplay.errors import OutputError
+
+#: Marks a folder as ours.
+MARKER = "batch.json"
+REPORTS, MAPS, SCRATCH, LOCK = "logs", "maps", ".scratch", ".lock"
+VERSION = 1
+
+_NAME_LENGTH = 60
+
+
+@contextmanager
+def batch_folder(target: Path) -> Iterator[Path]:
+    """A batch's folder for the time of one run, locked against others; gives its scratch folder.
+
+    Raises:
+        OutputError: it is somebody else's, of another version, cannot be written, or another
+            program is at work in it.
+    """
+    check_target(target, MARKER)
+    try:
+        target.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OutputError(f"cannot write: {error.strerror or error}", where=target) from error
+    _settle_marker(target / MARKER)
+    with held_lock(target / LOCK):
+        scratch = target / SCRATCH
+        shutil.rmtree(scratch, ignore_errors=True)  # of one that was killed
+        scratch.mkdir()
+        try:
+            yield scratch
+        finally:
+            shutil.rmtree(scratch, ignore_errors=True)
+
+
+def report_folder(task: LogTask) -> str:
+    """Where the report of a log goes, from the batch's folder: readable, and no other log's."""
+    name = re.split(r"[/\\]", task.source.log.rstrip("/\\"))[-1]
+    plain = re.sub(r"[^A-Za-z0-9._-]+", "_", name).strip("._")[:_NAME_LENGTH] or "log"
+    return f"{REPORTS}/{plain}-{task.key[:12]}"
+
+
+def map_folder(version: str) -> str:
+    """Where a map goes, from the batch's folder."""
+    return f"{MAPS}/{version.removeprefix('sha256:')[:16]}"
+
+
+def _settle_marker(marker: Path) -> None:
+    if not marker.exists():
+        write_file(
+            marker, (json.dumps({"slamreplay": "batch", "version": VERSION}) + "\n").encode()
+        )
+        return
+    try:
+        found = json.loads(marker.read_text(encoding="utf-8"))
+        version = found["version"] if found["slamreplay"] == "batch" else None
+    except (OSError, ValueError, KeyError, TypeError):
+        version = None
+    if version != VERSION:
+        said = "is none of a batch" if version is None else f"is of version {version}"
+        raise OutputError(said, where=marker, hint="name another output with -o")

@@ -1,0 +1,162 @@
+"""Tasks out to the workers, results in as they come, whoever dies on the way."""
+
+from __future__ import annotations
+
+import time
+import uuid
+from collections.abc import Generator, Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+from queue import Empty, SimpleQueue
+from typing import TYPE_CHECKING
+
+from slamreplay.batch.cluster import ClusterError, Workers, connected
+from slamreplay.batch.task import LogResult, LogTask
+from slamreplay.batch.work import Work
+from slamreplay.batch.worker import failed, line_of, look_back
+
+if TYPE_CHECKING:
+    from distributed import Client, Future
+
+#: How often is looked whether the cluster still lives, s.
+_LOOK_S = 1.0
+#: How long a scheduler that went away is looked for, and how long workers may be missing, s.
+RECONNECT_S, WITHOUT_WORKERS_S = 120.0, 600.0
+_KEPT = "what is done is kept: run the same command again"
+
+
+class _LostError(Exception):
+    """The scheduler went away."""
+
+
+def looked_back(tasks: Sequence[LogTask], workers: Workers, scratch: Path) -> Generator[LogResult]:
+    """The result of every task, once each, in the order they are done.
+
+    A worker that dies may have died of the log it worked on, or of another's. All logs that it had
+    are tried again at the end with nothing beside them: who kills workers even then fails. A
+    scheduler that goes away is looked for, and what it had is given to it anew.
+
+    Args:
+        tasks: what to do; few of them are out at any time, so nothing piles up anywhere.
+        workers: who does it.
+        scratch: folder for what workers of this machine write.
+
+    Raises:
+        ClusterError: the cluster cannot be used, or went away for good.
+    """
+    work = Work(tasks)
+    lost: float | None = None
+    while work.left:
+        try:
+            with connected(workers, scratch) as client:
+                for result in _served(client, work, workers):
+                    lost = None
+                    yield result
+        except _LostError:
+            lost = time.monotonic() if lost is None else lost
+            work.give_back()
+        except ClusterError:
+            if lost is None:
+                raise
+        if lost is not None:
+            if time.monotonic() - lost > RECONNECT_S:
+                raise ClusterError("the scheduler went away", where=workers.scheduler, hint=_KEPT)
+            time.sleep(_LOOK_S)
+
+
+def _served(client: Client, work: Work, workers: Workers) -> Iterator[LogResult]:
+    """Results until nothing is left.
+
+    Raises:
+        _LostError: the scheduler went away; what is out is still marked so.
+        ClusterError: no worker came for a long time.
+    """
+    out: dict[Future, LogTask] = {}
+    ended: SimpleQueue[Future] = SimpleQueue()
+    seen = looked = time.monotonic()
+    threads = _threads(client)
+    while work.left:
+        while (task := work.next(threads)) is not None:
+            future = _sent(client, task)
+            out[future] = task
+            future.add_done_callback(ended.put)
+        try:
+            future = ended.get(timeout=_LOOK_S)
+        except Empty:
+            future = None
+        now = time.monotonic()
+        if future is None or now - looked > _LOOK_S:
+            threads, looked = _threads(client), now
+            seen = now if threads else seen
+            if now - seen > WITHOUT_WORKERS_S:
+                raise ClusterError(
+                    f"no worker for {WITHOUT_WORKERS_S:g} s", where=workers.scheduler, hint=_KEPT
+                )
+            if any(sent.cancelled() for sent in out):
+                raise _LostError
+        if future is not None:
+            task = out.pop(future)
+            result = _outcome(future, task, work, workers)
+            future.release()
+            if result is not None:
+                yield result
+
+
+def _sent(client: Client, task: LogTask) -> Future:
+    # The same task may go out several times, and dask takes one key for one result.
+    key = f"look_back-{task.key}-{uuid.uuid4().hex[:8]}"
+    try:
+        return client.submit(look_back, task, key=key, pure=False)
+    except OSError as error:
+        raise _LostError from error
+
+
+def _threads(client: Client) -> int:
+    """Tasks that all workers together can work on at once."""
+    try:
+        if client.status == "running":
+            return sum(client.nthreads().values())
+    except (OSError, TimeoutError, ValueError) as error:
+        raise _LostError from error
+    raise _LostError
+
+
+def _outcome(future: Future, task: LogTask, work: Work, workers: Workers) -> LogResult | None:
+    """The result of a task that ended; None if it goes out again."""
+    from distributed import CancelledError, KilledWorker
+
+    try:
+        result: LogResult = future.result()
+    except KilledWorker as error:
+        if not work.died(task.key, error.allowed_failures + 1):
+            return None
+        line = f"its worker died {work.deaths[task.key]} times (hint: {_memory_hint(workers)})"
+        return _with_attempts(failed(task, line), work.deaths[task.key])
+    except (CancelledError, OSError, TimeoutError) as error:
+        raise _LostError from error
+    except Exception as error:  # `look_back` raises nothing: it was not even begun
+        if not work.died(task.key):
+            return None
+        return _with_attempts(failed(task, line_of(error)), work.deaths[task.key])
+    work.done(task.key)
+    return _with_attempts(result, work.deaths[task.key] + 1)
+
+
+def _memory_hint(workers: Workers) -> str:
+    if workers.scheduler is not None:
+        return "it may need more memory than its workers have; their own log tells"
+    limit = "its share of the machine's" if workers.memory_limit is None else workers.memory_limit
+    return f"it may need more memory than {limit}, see --memory-limit"
+
+
+def _with_attempts(result: LogResult, begun: int) -> LogResult:
+    """The result with how often it was begun, as far as known: the worker does not know."""
+    import pyarrow as pa
+
+    costs = result.tables.get("costs")
+    if costs is None:
+        return result
+    at = costs.schema.get_field_index("attempts")
+    column = pa.array([begun] * len(costs), costs.schema.field(at).type)
+    costs = costs.set_column(at, costs.schema.field(at), column)
+    return replace(result, tables={**result.tables, "costs": costs})

@@ -1,0 +1,134 @@
+"""A batch from its tasks to its folder: what is missing is done, what is there is kept."""
+
+from __future__ import annotations
+
+import time
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import closing
+from dataclasses import dataclass
+from pathlib import Path
+
+from slamreplay.batch.cluster import Workers
+from slamreplay.batch.commit import Fate, commit_result, fate_of, fates
+from slamreplay.batch.folder import batch_folder
+from slamreplay.batch.loop import looked_back
+from slamreplay.batch.task import LogTask
+from slamreplay.fleet.store import compact
+
+#: Rows come as a folder per log; so many of those become one.
+_COMPACT_EVERY = 100
+_MB = 1e6
+
+
+@dataclass(frozen=True)
+class BatchEnd:
+    """What a batch came to.
+
+    Attributes:
+        logs: asked for.
+        kept: of them, done by an earlier run.
+        states: how many of them have which verdict, by its state.
+        failed: place and line of those that failed, in the order they were asked for.
+        megabytes: of the logs done now.
+        seconds: that it took.
+    """
+
+    logs: int
+    kept: int
+    states: Mapping[str, int]
+    failed: tuple[tuple[str, str], ...]
+    megabytes: float
+    seconds: float
+
+
+def run_batch(
+    tasks: Sequence[LogTask],
+    target: Path,
+    workers: Workers,
+    *,
+    again_failed: bool = False,
+    progress: Callable[[str, float], None] | None = None,
+) -> BatchEnd:
+    """Look back on every log that is not in the folder yet, and keep each as it is done.
+
+    Whoever is killed at whatever moment, the same call again does what is missing.
+
+    Args:
+        tasks: the logs; of two with one key the first counts.
+        target: the batch's folder.
+        workers: who does it.
+        again_failed: try those again that failed before.
+        progress: told how many are done, and the share done.
+
+    Raises:
+        OutputError: the folder is somebody else's, in use, or cannot be written.
+        ClusterError: the cluster cannot be used, or went away for good.
+    """
+    begun = time.monotonic()
+    tasks = list({task.key: task for task in reversed(tasks)}.values())[::-1]
+    with batch_folder(target) as scratch:
+        compact(target)  # also clears what one that was killed left
+        before = fates(target)
+        told = {
+            task.key: before[task.key]
+            for task in tasks
+            if task.key in before and not (again_failed and before[task.key].error is not None)
+        }
+        todo = [task for task in tasks if task.key not in told]
+        kept = len(told)
+        say = _Telling(todo, len(tasks), progress)
+        say(told)
+        with closing(looked_back(todo, workers, scratch)) as results:
+            for n, result in enumerate(results, start=1):
+                commit_result(target, result)
+                told[result.key] = fate_of(result)
+                say(told, result.key)
+                if n % _COMPACT_EVERY == 0:
+                    compact(target)
+        compact(target)
+    states = Counter(fate.state for fate in told.values() if fate.state is not None)
+    failed = [(task.source.log, told[task.key].error) for task in tasks]
+    return BatchEnd(
+        logs=len(tasks),
+        kept=kept,
+        states=dict(sorted(states.items())),
+        failed=tuple((log, line) for log, line in failed if line is not None),
+        megabytes=sum(size_of(task) for task in todo) / _MB,
+        seconds=time.monotonic() - begun,
+    )
+
+
+def size_of(task: LogTask) -> int:
+    """Bytes of its files, as far as they are known."""
+    return sum(file.size or 0 for file in task.source.files)
+
+
+class _Telling:
+    """Says how far a batch is: by bytes, for a long log takes longer, or else by logs."""
+
+    def __init__(
+        self,
+        todo: Sequence[LogTask],
+        logs: int,
+        progress: Callable[[str, float], None] | None,
+    ) -> None:
+        sizes = {task.key: size_of(task) for task in todo}
+        self._sizes = sizes if all(sizes.values()) else dict.fromkeys(sizes, 1)
+        self._all = max(sum(self._sizes.values()), 1)
+        self._done = 0
+        self._logs = logs
+        self._progress = progress
+
+    def __call__(self, told: Mapping[str, Fate], key: str | None = None) -> None:
+        self._done += 0 if key is None else self._sizes[key]
+        if self._progress is None:
+            return
+        parts = [f"{len(told)} of {self._logs}"]
+        for word, count in (
+            ("failed", sum(fate.error is not None for fate in told.values())),
+            ("lost", sum("lost" in (fate.state or "") for fate in told.values())),
+            ("changed", sum("changed" in (fate.state or "") for fate in told.values())),
+        ):
+            parts += [f"{count} {word}"] if count else []
+        self._progress(", ".join(parts), self._done / self._all)

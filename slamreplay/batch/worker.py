@@ -1,0 +1,214 @@
+"""One log of many, from its files to what is kept of it: what runs in the workers."""
+
+from __future__ import annotations
+
+import hashlib
+import shutil
+import sys
+import tempfile
+import time
+import traceback
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from slamreplay.batch.folder import report_folder
+from slamreplay.batch.task import LogResult, LogTask
+from slamreplay.errors import SlamreplayError, UsageError
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+    from slamreplay.bundle.view import Bundle
+    from slamreplay.evidence.result import Postmortem
+
+#: Folders within the scratch one.
+_NAMED, _LOG = "named", "log"
+_MB = 1e6
+
+
+@dataclass(frozen=True)
+class Cost:
+    """What a log took so far.
+
+    Attributes:
+        cpu_s: of this process.
+        wall_s: by the clock.
+    """
+
+    cpu_s: float
+    wall_s: float
+
+
+def look_back(task: LogTask, scratch: Path | None = None) -> LogResult:
+    """What is kept of one log; whatever goes wrong with it becomes its line.
+
+    Nothing is left behind: the files that were fetched are removed with the scratch folder.
+
+    Args:
+        task: the log.
+        scratch: folder that takes a folder for the time of the work; that of the dask worker by
+            default, and the system's temporary one outside of one.
+
+    Returns:
+        The same bytes for the same task, but for the table `costs`.
+    """
+    spent = _stopwatch()
+    folder = Path(tempfile.mkdtemp(prefix="slamreplay-", dir=scratch or _worker_folder()))
+    try:
+        with _one_thread():
+            return _judged(task, folder, spent)
+    except Exception as error:  # one log never stops the others
+        return failed(task, _without(folder, line_of(error)), spent())
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+def failed(task: LogTask, line: str, cost: Cost | None = None) -> LogResult:
+    """The result of a log that could not be looked back on, with the line that says why."""
+    from slamreplay.fleet.rows import failed_rows
+
+    source = task.source
+    tables = dict(
+        failed_rows(line, key=task.key, log=source.log, bytes=_bytes_of(task), labels=source.labels)
+    )
+    if cost is not None:
+        tables |= _costs(task.key, cost)
+    return LogResult(task.key, line, {}, {}, tables)
+
+
+def line_of(error: BaseException) -> str:
+    """One line that says what went wrong; of a fault of ours also where."""
+    if isinstance(error, SlamreplayError):
+        return str(error)
+    if isinstance(error, MemoryError):
+        return "not enough memory for it (hint: fewer workers leave more for each)"
+    frames = traceback.extract_tb(error.__traceback__)
+    where = f" at {Path(frames[-1].filename).name}:{frames[-1].lineno}" if frames else ""
+    text = " ".join(str(error).split())[:200]
+    return f"a fault of ours: {type(error).__name__}: {text}{where}"
+
+
+def _judged(task: LogTask, folder: Path, spent: Callable[[], Cost]) -> LogResult:
+    from slamreplay.fleet.rows import rows_of
+    from slamreplay.postmortem import postmortem
+    from slamreplay.report.build import build
+    from slamreplay.report.writer import write_report
+
+    post = postmortem(_evidence(task, folder), cause=task.cause)
+    write_report(post, folder / "report")
+    tables = dict(
+        rows_of(
+            post,
+            build(post),
+            key=task.key,
+            log=task.source.log,
+            content=_content(post),
+            bytes=_bytes_of(task),
+            labels=task.source.labels,
+            gate=None,
+            report_folder=report_folder(task),
+        )
+    )
+    tables |= _costs(task.key, spent())
+    return LogResult(task.key, None, _read(folder / "report"), _map_files(post), tables)
+
+
+def _evidence(task: LogTask, folder: Path) -> Bundle:
+    from slamreplay.batch.fetch import fetch
+    from slamreplay.batch.named import placed
+    from slamreplay.bundle.store import is_bundle
+    from slamreplay.bundle.view import Bundle
+    from slamreplay.ingest.options import IngestOptions
+    from slamreplay.ingest.pipeline import ingest
+
+    for name in (_NAMED, _LOG):
+        (folder / name).mkdir()
+    map_yaml, topics = placed(task.named, folder / _NAMED)
+    options = IngestOptions(map=map_yaml, topics=topics, robot=task.source.robot)
+    logs = fetch(task.source, task.storage, folder / _LOG)
+    if len(logs) > 1 or not is_bundle(logs[0]):
+        return ingest(logs, folder / "log.bundle", options)
+    if options != IngestOptions():
+        raise UsageError("a bundle takes no map, topics or robot: it was ingested already")
+    return Bundle.open(logs[0])
+
+
+def _content(post: Postmortem) -> str:
+    """One hash over those of its files."""
+    files = sorted(source.sha256 for source in post.manifest.sources)
+    return hashlib.sha256(" ".join(files).encode()).hexdigest()
+
+
+def _read(folder: Path) -> dict[str, bytes]:
+    """Every file of a folder, in the order of their names."""
+    files = sorted(path for path in folder.rglob("*") if path.is_file())
+    return {path.relative_to(folder).as_posix(): path.read_bytes() for path in files}
+
+
+def _map_files(post: Postmortem) -> Mapping[str, bytes]:
+    from slamreplay.maps.map_server import map_files
+
+    return {} if post.grid is None else map_files(post.grid, "map")
+
+
+def _bytes_of(task: LogTask) -> int | None:
+    sizes = [file.size for file in task.source.files]
+    return None if None in sizes else sum(size or 0 for size in sizes)
+
+
+def _without(folder: Path, line: str) -> str:
+    """The line without the scratch folder, which is another one every time."""
+    for inner in (f"{_NAMED}/", f"{_LOG}/", ""):
+        line = line.replace(f"{folder.as_posix()}/{inner}", "")
+    return line
+
+
+def _worker_folder() -> str | None:
+    """The folder of this dask worker: dask clears those of workers that were killed."""
+    if "distributed" not in sys.modules:
+        return None
+    from distributed import get_worker
+
+    try:
+        return str(get_worker().local_directory)
+    except ValueError:
+        return None
+
+
+@contextmanager
+def _one_thread() -> Iterator[None]:
+    """A worker has one core to itself: threads within it would only stand in each other's way."""
+    import numba
+
+    before = numba.get_num_threads()
+    numba.set_num_threads(1)
+    try:
+        yield
+    finally:
+        numba.set_num_threads(before)
+
+
+def _stopwatch() -> Callable[[], Cost]:
+    cpu, wall = time.process_time(), time.perf_counter()
+    return lambda: Cost(time.process_time() - cpu, time.perf_counter() - wall)
+
+
+def _costs(key: str, cost: Cost) -> dict[str, pa.Table]:
+    from slamreplay.fleet.rows import costs_row
+
+    return costs_row(key=key, cpu_s=cost.cpu_s, wall_s=cost.wall_s, peak_mb=peak_mb(), attempts=1)
+
+
+def peak_mb() -> float:
+    """Greatest resident memory of this process so far, MB."""
+    try:  # the figure of getrusage starts at that of the process that started this one
+        status = Path("/proc/self/status").read_text(encoding="utf-8")
+        return int(status.split("VmHWM:")[1].split()[0]) * 1024 / _MB
+    except (OSError, IndexError):
+        import resource
+
+        unit = 1 if sys.platform == "darwin" else 1024
+        return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit / _MB

@@ -1,0 +1,114 @@
+"""`slamreplay batch`: post-mortems of many logs, on this machine or a cluster."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from slamreplay.cli.options import Json
+from slamreplay.cli.terminal import complain, say, say_json, say_path
+
+if TYPE_CHECKING:
+    from slamreplay.batch.run import BatchEnd
+
+#: So many failed logs are told with their line; all of them stand in the tables.
+_MOST_FAILED = 10
+_INTERRUPTED = 130
+
+Places = Annotated[
+    list[str],
+    typer.Argument(
+        metavar="PLACE...",
+        help="Folders, logs, patterns ('logs/**/*.mcap'), addresses (s3://...), manifests.",
+    ),
+]
+Output = Annotated[
+    Path,
+    typer.Option("-o", "--output", metavar="DIR", help="Where reports, tables and the page go."),
+]
+Scheduler = Annotated[
+    str | None,
+    typer.Option("--scheduler", metavar="ADDRESS", help="A dask cluster, as tcp://HOST:8786."),
+]
+Count = Annotated[
+    int | None,
+    typer.Option("--workers", metavar="N", help="Processes here; one per core by default."),
+]
+MemoryLimit = Annotated[
+    str | None,
+    typer.Option(
+        "--memory-limit", metavar="SIZE", help="A worker beyond it is started anew, as 4GiB."
+    ),
+]
+Cause = Annotated[
+    bool, typer.Option("--cause/--no-cause", help="Replay what went wrong to name its root cause.")
+]
+AgainFailed = Annotated[
+    bool, typer.Option("--again-failed", help="Try logs again that failed before.")
+]
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command."""
+    app.command(
+        name="batch", help="Look back on many logs; the same again does only what is missing."
+    )(_batch)
+
+
+def _batch(
+    places: Places,
+    output: Output,
+    scheduler: Scheduler = None,
+    workers: Count = None,
+    memory_limit: MemoryLimit = None,
+    cause: Cause = True,
+    again_failed: AgainFailed = False,
+    as_json: Json = False,
+) -> None:
+    from slamreplay.batch.cluster import Workers
+    from slamreplay.batch.keys import task_of
+    from slamreplay.batch.run import run_batch
+    from slamreplay.batch.sources import sources_of
+    from slamreplay.cli.progress import progress_bar
+
+    who = Workers(workers, memory_limit, scheduler).checked()
+    tasks = [task_of(source, cause=cause) for source in sources_of(places, tell=complain)]
+    try:
+        with progress_bar("looking back") as progress:
+            end = run_batch(tasks, output, who, again_failed=again_failed, progress=progress)
+    except KeyboardInterrupt:
+        complain(f"stopped; what is done is kept in {output}: the same command again goes on")
+        raise typer.Exit(_INTERRUPTED) from None
+    if as_json:
+        say_json(_as_json(end, output))
+    else:
+        _show(end)
+        say_path(output)
+
+
+def _as_json(end: BatchEnd, output: Path) -> dict[str, object]:
+    return {
+        "output": str(output),
+        "logs": end.logs,
+        "kept": end.kept,
+        "states": dict(end.states),
+        "failed": [{"log": log, "error": line} for log, line in end.failed],
+        "done_mb": round(end.megabytes, 3),
+        "seconds": round(end.seconds, 3),
+    }
+
+
+def _show(end: BatchEnd) -> None:
+    now = end.logs - end.kept
+    counts = [f"{count} {state}" for state, count in end.states.items()]
+    counts += [f"{len(end.failed)} failed"] if end.failed else []
+    say(f"{end.logs} logs: {', '.join(counts)}")
+    kept = f", {end.kept} were there already" if end.kept else ""
+    speed = f", {3600 * now / end.seconds:.0f} logs an hour" if now else ""
+    say(f"{now} done in {end.seconds:.0f} s ({end.megabytes:.0f} MB{speed}){kept}")
+    for log, line in end.failed[:_MOST_FAILED]:
+        say(("! ", "bad"), line if log in line else f"{log}: {line}")
+    if len(end.failed) > _MOST_FAILED:
+        say(f"and {len(end.failed) - _MOST_FAILED} more that failed, see the table logs")

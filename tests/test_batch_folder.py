@@ -1,0 +1,106 @@
+"""The folder of a batch: names in it, whose it is, and one program in it at a time."""
+
+import json
+import os
+import subprocess
+import sys
+
+import pytest
+
+from slamreplay.batch.folder import batch_folder, report_folder
+from slamreplay.batch.lock import held_lock
+from slamreplay.batch.task import LogSource, LogTask
+from slamreplay.errors import OutputError
+
+HOLD = """
+import sys, time
+from pathlib import Path
+from slamreplay.batch.lock import held_lock
+with held_lock(Path(sys.argv[1])):
+    print("held", flush=True)
+    time.sleep(60)
+"""
+
+
+def folder_of(log):
+    return report_folder(LogTask("0123456789abcdef" * 2, LogSource(log, ())))
+
+
+@pytest.mark.parametrize(
+    ("log", "name"),
+    [
+        ("/data/day 1/run.mcap", "run.mcap"),
+        ("s3://bucket/site/run_7/", "run_7"),
+        ("/data/../..", "log"),
+        ("/data/.hidden", "hidden"),
+        ("C:\\logs\\ümlaut.bag", "mlaut.bag"),
+        ("/data/" + "x" * 300, "x" * 60),
+    ],
+)
+def test_reports_lie_under_a_name_that_any_system_takes(log, name):
+    assert folder_of(log) == f"logs/{name}-0123456789ab"
+
+
+def test_scratch_is_gone_afterwards(tmp_path):
+    target = tmp_path / "new" / "batch"
+    with batch_folder(target) as scratch:
+        (scratch / "large").write_bytes(b"x")
+
+    assert sorted(p.name for p in target.iterdir()) == [".lock", "batch.json"]
+
+
+def test_scratch_of_one_that_was_killed_is_cleared(tmp_path):
+    with batch_folder(tmp_path / "b"):
+        pass
+    left = tmp_path / "b" / ".scratch" / "left"
+    left.mkdir(parents=True)
+
+    with batch_folder(tmp_path / "b"):
+        assert not left.exists()
+
+
+def test_a_foreign_folder_is_refused(tmp_path):
+    (tmp_path / "thesis.tex").write_text("mine")
+
+    with pytest.raises(OutputError, match="exists and holds no batch"), batch_folder(tmp_path):
+        pass
+
+
+@pytest.mark.parametrize("text", ["", "[]", '{"slamreplay": "batch", "version": 99}'])
+def test_a_folder_of_another_version_is_refused(tmp_path, text):
+    (tmp_path / "batch.json").write_text(text)
+
+    with pytest.raises(OutputError, match=r"batch\.json: is "), batch_folder(tmp_path):
+        pass
+
+
+def test_the_lock_of_a_living_program_holds_and_that_of_a_killed_one_does_not(tmp_path):
+    path = tmp_path / ".lock"
+    holder = subprocess.Popen([sys.executable, "-c", HOLD, path], stdout=subprocess.PIPE, text=True)
+    with holder:
+        assert holder.stdout.readline() == "held\n"
+        with (
+            pytest.raises(OutputError, match=f"process {holder.pid} on .* is at work here"),
+            held_lock(path),
+        ):
+            pass
+        holder.kill()
+
+    with held_lock(path):
+        assert json.loads(path.read_text())["pid"] == os.getpid()
+    assert path.read_text() == ""
+
+
+def test_a_lock_from_another_machine_is_not_taken(tmp_path):
+    path = tmp_path / ".lock"
+    path.write_text('{"pid": 7, "host": "elsewhere"}')
+
+    with pytest.raises(OutputError, match=r"elsewhere .* may still be .*remove"), held_lock(path):
+        pass
+
+
+def test_a_damaged_lock_holds_nobody_up(tmp_path):
+    (tmp_path / ".lock").write_text("[7")
+
+    with held_lock(tmp_path / ".lock"):
+        pass
