@@ -27,10 +27,9 @@ def fetch(source: LogSource, storage: Mapping[str, object], folder: Path) -> lis
         if not is_local(file.url):
             raise UsageError("addresses are not read yet", where=shown(file.url))
         _check(file)
-    first = Path(source.files[0].url)
-    if source.folder:  # the folder is above the file's name, which may have folders in it
-        return [first.parents[len(Path(source.files[0].name).parts) - 1]]
-    return [first]
+    log = local_log(source)
+    assert log is not None
+    return [log]
 
 
 def _check(file: LogFile) -> None:
@@ -49,3 +48,13 @@ def changed(where: str) -> LogError:
         "changed since the batch listed it", where=where,
         hint="run the batch again when nobody writes to it",
     )  # fmt: skip
+
+
+def local_log(source: LogSource) -> Path | None:
+    """Path of the file or folder that a log on this machine is, None of one elsewhere."""
+    first = source.files[0]
+    if not is_local(first.url):
+        return None
+    # The folder is above the file's name, which may have folders in it.
+    depth = len(Path(first.name).parts) if source.folder else 0
+    return Path(first.url).parents[depth - 1] if depth else Path(first.url)
