@@ -12,7 +12,9 @@ if TYPE_CHECKING:
     from slamreplay.bundle.findings import Explanation
     from slamreplay.registry import Registry
 
-KINDS = ("estimators", "perturbations", "checks", "decoders", "scenarios", "findings", "labs")
+KINDS = (
+    "estimators", "perturbations", "checks", "decoders", "scenarios", "findings", "labs", "metrics",
+)  # fmt: skip
 
 
 def catalogue(kind: str) -> list[dict[str, object]]:
@@ -33,6 +35,8 @@ def catalogue(kind: str) -> list[dict[str, object]]:
         return [{"name": name, "doc": what.title} for name, what in FINDINGS.items()]
     if kind == "perturbations":
         return _perturbations()
+    if kind == "metrics":
+        return _metrics()
     registry = _registry(kind)
     rows: list[dict[str, object]] = []
     for name in registry:
@@ -69,6 +73,18 @@ def _perturbations() -> list[dict[str, object]]:
                 }
             )
     return rows
+
+
+def _metrics() -> list[dict[str, object]]:
+    """Those that a gate may limit: per log, over time, and of estimators that run again."""
+    from slamreplay.gate.metrics import METRICS, OF_TRIALS
+
+    named = [(name, "time" if of.over_time else "log", of) for name, of in METRICS.items()]
+    named += [(f"ESTIMATOR.{name}", "run", of) for name, of in OF_TRIALS.items()]
+    return [
+        {"name": name, "per": per, "unit": of.unit, "better": of.better, "doc": of.doc}
+        for name, per, of in named
+    ]
 
 
 def explanation_of(id_: str) -> tuple[str, Explanation]:

@@ -62,3 +62,8 @@ def held_out() -> list[str]:
 def recipes() -> list[str]:
     """Recipes below the current folder; where none fits the shell goes on with file names."""
     return sorted(path.as_posix() for path in Path("recipes").glob("*/recipe.yaml"))
+
+
+def gates() -> list[str]:
+    """Gates below the current folder, as `recipes`."""
+    return sorted(path.as_posix() for path in Path("recipes").glob("*/gate.yaml"))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from typing import Literal, get_args
@@ -56,39 +56,38 @@ class Asked:
 
 
 def asked(text: str) -> Asked:
-    """What a text asks for.
+    """What a text asks for, whether or not there is such a thing."""
+    kind, is_one, name = text.partition("=")
+    for one in _NAMES:
+        if is_one and one == kind != "finding":
+            return Asked(text, one, name)
+    return Asked(text, "finding", text)
+
+
+def check_asked(text: str) -> None:
+    """Refuse a text that names nothing there is.
 
     Raises:
-        UsageError: it names nothing that there is; the hint has the nearest.
+        UsageError: with the nearest that there is.
     """
-    kind, is_one, name = text.partition("=")
-    if not is_one:
-        entry = Asked(text, "finding", text)
-        if not any(entry.fits(id_) for id_ in FINDINGS) and not _may_be_foreign(text):
-            raise UsageError(f"there is no finding {text[:80]!r}", hint=_near(text, FINDINGS))
-        return entry
-    kinds = [one for one in _NAMES if one != "finding"]
-    if kind not in kinds:
+    entry = asked(text)
+    known = _NAMES[entry.kind]
+    kind, is_one, _ = text.partition("=")
+    if is_one and entry.kind == "finding":
+        kinds = [one for one in _NAMES if one != "finding"]
         raise UsageError(f"{text[:80]!r} asks for {kind[:40]!r}", hint=nearest(kind, kinds))
-    for one in kinds:
-        if one == kind:
-            entry = Asked(text, one, name)
-            if any(entry.fits(known) for known in _NAMES[one]):
-                return entry
-    said = kind.replace("_", " ")
-    raise UsageError(f"there is no {said} {name[:80]!r}", hint=_near(name, _names_of(kind)))
+    if any(entry.fits(name) for name in known) or _may_be_foreign(entry):
+        return
+    said = entry.kind.replace("_", " ")
+    name = entry.pattern.upper() if entry.kind == "finding" else entry.pattern
+    hint = nearest(name, known)
+    if len(hint) > 300:  # all findings there are would be a page
+        hint = "'slamreplay list findings' has them all"
+    raise UsageError(f"there is no {said} {entry.pattern[:80]!r}", hint=hint)
 
 
-def _names_of(kind: str) -> Sequence[str]:
-    return STATES if kind == "state" else FAILURES
-
-
-def _near(name: str, names: Iterable[str]) -> str:
-    """The nearest one; of many not all, but where they are listed."""
-    hint = nearest(name.upper() if names is FINDINGS else name, names)
-    return "'slamreplay list findings' has them all" if len(hint) > 300 else hint
-
-
-def _may_be_foreign(id_: str) -> bool:
+def _may_be_foreign(entry: Asked) -> bool:
     """Whether a check of another package may raise it: ours all begin with SR-."""
-    return not id_.startswith("SR-") and any(not CHECKS.is_ours(name) for name in CHECKS)
+    if entry.kind != "finding" or entry.pattern.startswith("SR-"):
+        return False
+    return any(not CHECKS.is_ours(name) for name in CHECKS)

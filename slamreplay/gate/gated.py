@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
+from pathlib import Path
 
-from slamreplay.bundle.run import Trial
+from slamreplay.bundle.run import Run, Trial
 from slamreplay.bundle.view import Bundle
 from slamreplay.evidence.result import Postmortem
 from slamreplay.gate.assessable import unasked
@@ -14,6 +15,7 @@ from slamreplay.gate.measures import Measures
 from slamreplay.gate.measuring import measures_of
 from slamreplay.gate.outcome import GatedLog, Outcome
 from slamreplay.gate.rules import Demands, Rules
+from slamreplay.replay.runner import replay
 
 
 def gated(
@@ -24,25 +26,22 @@ def gated(
     measures: Measures | None = None,
     cause: bool = True,
     failed_before: Collection[str] = (),
-    compared: Sequence[Outcome] = (),
     report: str | None = None,
 ) -> GatedLog:
     """What the gate says of one log.
 
     Args:
-        post: the log, looked back on; with the runs of `trials_of` where there are any.
+        post: the log, looked back on; with the runs of `runs_of` where there are any.
         demands: of the recipe.
         log: its path with forward slashes: it chooses the rules, and CI shows it.
         measures: those of the post-mortem, where somebody has them already.
         cause: whether root causes were looked for.
         failed_before: ids of checks that failed in this log when the baseline was made.
-        compared: outcomes of the comparison with the baseline, to stand behind the others.
         report: folder of its report beside the gate's files.
     """
     measures = measures_of(post) if measures is None else measures
     rules = demands.rules_of(log)
     outcomes = [*checked(rules, post, measures, cause=cause, failed_before=failed_before)]
-    outcomes += compared
     if rules.require_assessable and outcomes and all(o.status == "skipped" for o in outcomes):
         outcomes.append(_nothing(outcomes))
     judgement = post.judgement
@@ -81,13 +80,31 @@ def unread(log: str, why: str) -> GatedLog:
     return GatedLog(log, None, why, None, (outcome,))
 
 
-def trials_of(demands: Demands, bundle: Bundle) -> list[Trial]:
-    """The runs that the limits of the demands are about: each estimator, each seed."""
-    return [
+def runs_of(
+    demands: Demands,
+    bundle: Bundle,
+    *,
+    progress: Callable[[str, float], None] | None = None,
+    cache: Path | None = None,
+    workers: int | None = None,
+) -> list[Run]:
+    """The runs that limits are about: each estimator of the demands, undisturbed, with each seed.
+
+    Args:
+        demands: of the recipe.
+        bundle: the log.
+        progress: as of `replay`.
+        cache: as of `replay`.
+        workers: as of `replay`.
+    """
+    trials = [
         Trial(bundle.manifest.bundle_id, name, seed)
         for name in demands.estimators
         for seed in range(demands.seeds)
     ]
+    if not trials:
+        return []
+    return replay(bundle, trials, progress=progress, cache=cache, workers=workers)
 
 
 def _nothing(outcomes: Sequence[Outcome]) -> Outcome:

@@ -20,7 +20,7 @@ class Outcome:
 
     Attributes:
         check: its id, the same in every log and run: `expect/SR-LOC-001`, `forbid/SR-MAP-001`,
-            `severity`, `limit/error_max_m`, `baseline/error_mean_m`, `read`.
+            `severity`, `limit/error_max_m`, `baseline/error_mean_m`, `assessable`, `read`.
         title: what it demands, in a few words.
         status: how it ended.
         severity: how bad a failure is.
@@ -50,9 +50,10 @@ class GatedLog:
 
     Attributes:
         log: its path as the command line has it, with forward slashes: what CI shows and links to.
-        state: of the verdict; None where it could not be read.
+        state: of the verdict; None where it could not be read, and of all logs together, which
+            stand under the path of the baseline.
         summary: of the verdict, or the line that says why it could not be read.
-        start_ns: of the log; None where it could not be read.
+        start_ns: of the log; None likewise.
         outcomes: in the order of the rules.
         report: folder of its report beside the gate's files; None where none was written.
     """

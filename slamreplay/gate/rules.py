@@ -51,6 +51,20 @@ class Rules:
 
 
 @dataclass(frozen=True)
+class BaselineRules:
+    """When a difference from the committed baseline counts.
+
+    Attributes:
+        alpha: chance of any false alarm in a run of the gate, over all its tests (after Holm).
+        margins: by number, the difference below which it does not matter, in the number's unit;
+            those that are not named have the defaults of `gate.baseline_metrics`.
+    """
+
+    alpha: float = 0.001
+    margins: Mapping[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
 class Demands:
     """A whole recipe of a gate.
 
@@ -63,6 +77,7 @@ class Demands:
         estimators: run again on every log, so that their numbers can be limited, too, as
             `amcl.error_max_m`.
         seeds: how often each of them runs.
+        baseline: when a difference from an earlier run counts.
     """
 
     question: str
@@ -70,6 +85,7 @@ class Demands:
     of_logs: Mapping[str, Rules] = field(default_factory=dict)
     estimators: tuple[str, ...] = ()
     seeds: int = 1
+    baseline: BaselineRules = field(default_factory=BaselineRules)
 
     def rules_of(self, log: str) -> Rules:
         """Those for one log, by its path with forward slashes."""

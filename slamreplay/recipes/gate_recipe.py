@@ -16,7 +16,7 @@ from pydantic import Field
 from slamreplay.bundle.findings import Severity
 from slamreplay.errors import UsageError
 from slamreplay.estimators import RECORDED
-from slamreplay.gate.asked import asked
+from slamreplay.gate.asked import check_asked
 from slamreplay.gate.metrics import metric_of
 from slamreplay.gate.rules import Demands, Limit, Rules
 from slamreplay.labs.lab import Strict
@@ -107,7 +107,8 @@ def gate_recipe(given: Mapping[str, Any], path: Path) -> GateRecipe:
         raise UsageError(
             "it demands nothing", where=path, hint=f"write one of {', '.join(KEYS[:-1])}"
         )
-    return GateRecipe(Demands(file.question, top, of_logs, estimators, file.seeds))
+    demands = Demands(file.question, top, of_logs=of_logs, estimators=estimators, seeds=file.seeds)
+    return GateRecipe(demands)
 
 
 def _rules(
@@ -150,7 +151,7 @@ def _demands(rules: Rules) -> bool:
 
 def _check_asked(texts: tuple[str, ...]) -> None:
     for text in texts:
-        asked(text)
+        check_asked(text)
     if len(set(texts)) != len(texts):
         twice = next(text for k, text in enumerate(texts) if text in texts[:k])
         raise UsageError(f"{twice} stands there twice")
