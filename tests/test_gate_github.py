@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from markdown_it import MarkdownIt
 
-from slamreplay.gate.github import annotations, step_summary
+from slamreplay.gate.github import annotations, commands_stopped, step_summary
 from slamreplay.gate.step_summary import MOST_BYTES
 
 
@@ -96,6 +96,16 @@ def test_any_text_is_one_command_and_one_row(text):
     assert len(commands(annotations(made))) == 1
     told = rendered(step_summary(made))
     assert len(told["tr"]) == 4  # two heads, a check and a log
+
+
+def test_commands_are_stopped_while_other_output_is_written():
+    lines = []
+    with pytest.raises(OSError, match="full"), commands_stopped(lines.append):
+        lines.append("::error::of a log")
+        raise OSError("full")
+
+    token = re.fullmatch(r"::stop-commands::(\w{32})\n", lines[0])[1]
+    assert lines[1:] == ["::error::of a log", f"::{token}::\n"]
 
 
 class _Told(HTMLParser):

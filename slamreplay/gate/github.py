@@ -6,7 +6,9 @@ actions/runner, ExecutionContext.cs). So checks that fail on many logs share one
 the last one tells what was left out.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from secrets import token_hex
 
 from slamreplay.bundle.findings import Severity
 from slamreplay.evidence.clean import clean, one_line, straight
@@ -14,7 +16,7 @@ from slamreplay.gate.failures import Failure, failures, relative
 from slamreplay.gate.outcome import GateResult
 from slamreplay.gate.step_summary import step_summary
 
-__all__ = ["annotations", "step_summary"]
+__all__ = ["annotations", "commands_stopped", "step_summary"]
 
 _COMMAND: dict[Severity, str] = {"error": "error", "warning": "warning", "info": "notice"}
 #: Annotations of one kind that the runner takes from a step.
@@ -51,6 +53,24 @@ def annotations(result: GateResult) -> str:
         )
         lines.append(_command("notice", {"title": "slamreplay gate"}, told))
     return "".join(f"{line}\n" for line in lines)
+
+
+@contextmanager
+def commands_stopped(write: Callable[[str], object]) -> Iterator[None]:
+    """While this holds the runner takes no command from the output, whatever a log wrote.
+
+    Other output of the program may quote a log, too, and a terminal's width may fold such a text
+    so that "::" begins a line.
+
+    Args:
+        write: to the output; called with whole lines.
+    """
+    token = token_hex(16)  # nobody who writes a log can know it
+    write(f"::stop-commands::{token}\n")
+    try:
+        yield
+    finally:
+        write(f"::{token}::\n")
 
 
 def _groups(found: list[Failure]) -> list[list[Failure]]:
