@@ -100,9 +100,8 @@ def test_any_text_is_one_command_and_one_row(text):
 
 def test_commands_are_stopped_while_other_output_is_written():
     lines = []
-    with pytest.raises(OSError, match="full"), commands_stopped(lines.append):
+    with commands_stopped(lines.append):
         lines.append("::error::of a log")
-        raise OSError("full")
 
     token = re.fullmatch(r"::stop-commands::(\w{32})\n", lines[0])[1]
     assert lines[1:] == ["::error::of a log", f"::{token}::\n"]
@@ -157,7 +156,9 @@ def test_summary_tells_what_failed_then_every_log_worst_first():
     assert text.startswith("## Gate: could not read every log\n")
     assert "Of 4 logs: 1 could not be read, 1 failed, 1 not assessable, 1 passed." in text
     assert rows[1].startswith("readwhat read demands error 1 of 4 not a log")
-    assert rows[5].startswith("logs/e.bag could not be read not a log: it ends after 12 bytes")
+    assert rows[5].startswith(
+        "logs/e.bag could not be read what read demands: not a log: it ends after 12 bytes"
+    )
     assert rows[6].startswith("./logs/b c.mcap failed")
     assert [row.split()[0] for row in rows[8:]] == ["logs/d", "logs/a.mcap"]
     assert "(reports/b%20c/report.html)" in text
