@@ -177,6 +177,9 @@ def test_texts_of_a_log_are_no_markup():
     rendered(text)
     assert "\u202e" not in text
     assert len(text.encode()) <= MOST_BYTES
+    address = gated.outcome(message="see https://a.example or www.a.example")
+    text = step_summary(gated.result(gated.log("a", address)))
+    assert "https\\://a.example or www\\.a.example" in text  # GitHub makes links of the rest
 
 
 def test_what_does_not_fit_is_counted():
