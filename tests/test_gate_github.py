@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from markdown_it import MarkdownIt
 
-from slamreplay.gate.github import annotations, commands_stopped, step_summary
+from slamreplay.gate.github import annotations, artifacts_of, commands_stopped, step_summary
 from slamreplay.gate.step_summary import MOST_BYTES
 
 
@@ -165,10 +165,13 @@ def test_summary_tells_what_failed_then_every_log_worst_first():
 
 
 def test_reports_that_cannot_be_reached_are_not_linked():
-    text = step_summary(gated.mixed(), artifacts="https://ci.example/runs/1#artifacts")
+    run = {"GITHUB_SERVER_URL": "https://h", "GITHUB_REPOSITORY": "o/r", "GITHUB_RUN_ID": "1"}
+
+    text = step_summary(gated.mixed(), artifacts=artifacts_of(run))
 
     assert "report.html" not in text
-    assert "(https://ci.example/runs/1#artifacts)" in text
+    assert "(https://h/o/r/actions/runs/1#artifacts)" in text
+    assert artifacts_of({**run, "GITHUB_RUN_ID": ""}) is None
 
 
 def test_texts_of_a_log_are_no_markup():
