@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from markdown_it import MarkdownIt
 
-from slamreplay.gate.github import annotations, step_summary
+from slamreplay.gate.github import annotations, artifacts_of, commands_stopped, step_summary
 from slamreplay.gate.step_summary import MOST_BYTES
 
 
@@ -98,6 +98,15 @@ def test_any_text_is_one_command_and_one_row(text):
     assert len(told["tr"]) == 4  # two heads, a check and a log
 
 
+def test_commands_are_stopped_while_other_output_is_written():
+    lines = []
+    with commands_stopped(lines.append):
+        lines.append("::error::of a log")
+
+    token = re.fullmatch(r"::stop-commands::(\w{32})\n", lines[0])[1]
+    assert lines[1:] == ["::error::of a log", f"::{token}::\n"]
+
+
 class _Told(HTMLParser):
     def __init__(self):
         super().__init__()
@@ -147,17 +156,22 @@ def test_summary_tells_what_failed_then_every_log_worst_first():
     assert text.startswith("## Gate: could not read every log\n")
     assert "Of 4 logs: 1 could not be read, 1 failed, 1 not assessable, 1 passed." in text
     assert rows[1].startswith("readwhat read demands error 1 of 4 not a log")
-    assert rows[5].startswith("logs/e.bag could not be read not a log: it ends after 12 bytes")
+    assert rows[5].startswith(
+        "logs/e.bag could not be read what read demands: not a log: it ends after 12 bytes"
+    )
     assert rows[6].startswith("./logs/b c.mcap failed")
     assert [row.split()[0] for row in rows[8:]] == ["logs/d", "logs/a.mcap"]
     assert "(reports/b%20c/report.html)" in text
 
 
 def test_reports_that_cannot_be_reached_are_not_linked():
-    text = step_summary(gated.mixed(), artifacts="https://ci.example/runs/1#artifacts")
+    run = {"GITHUB_SERVER_URL": "https://h", "GITHUB_REPOSITORY": "o/r", "GITHUB_RUN_ID": "1"}
+
+    text = step_summary(gated.mixed(), artifacts=artifacts_of(run))
 
     assert "report.html" not in text
-    assert "(https://ci.example/runs/1#artifacts)" in text
+    assert "(https://h/o/r/actions/runs/1#artifacts)" in text
+    assert artifacts_of({**run, "GITHUB_RUN_ID": ""}) is None
 
 
 def test_texts_of_a_log_are_no_markup():
@@ -166,6 +180,9 @@ def test_texts_of_a_log_are_no_markup():
     rendered(text)
     assert "\u202e" not in text
     assert len(text.encode()) <= MOST_BYTES
+    address = gated.outcome(message="see https://a.example or www.a.example")
+    text = step_summary(gated.result(gated.log("a", address)))
+    assert "https\\://a.example or www\\.a.example" in text  # GitHub makes links of the rest
 
 
 def test_what_does_not_fit_is_counted():

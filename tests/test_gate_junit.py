@@ -14,6 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from slamreplay.gate.junit import junit_xml
+from slamreplay.report.junit_suites import Case, Suite, junit_text
 
 # xunit-plugin, src/main/resources/org/jenkinsci/plugins/xunit/types/model/xsd/junit-10.xsd:
 # attributes (required, optional) and children of each element that is written here.
@@ -110,6 +111,13 @@ def test_texts_of_a_log_break_nothing():
     assert "whole pairs \U0001f916\U0010ffff" in messages
     assert any(message.endswith("... (1000000 letters in all)") for message in messages)
     assert not any("\n" in message for message in messages)
+
+
+def test_suites_are_cleaned_whoever_makes_them():
+    bad = "\x00\ud800"
+    case = Case(bad, "failure", "SR-LOC-001", message=bad, text=bad)
+
+    valid(junit_text([Suite(bad, [case, Case("b", text=bad)], {"summary": bad})]))
 
 
 @given(st.text(st.characters(exclude_categories=()), max_size=40))

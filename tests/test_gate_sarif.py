@@ -84,9 +84,13 @@ def test_what_failed_is_a_result_and_nothing_else():
 
     assert text == sarif_text(gated.mixed())
     assert [(x["ruleId"], x["level"], x["message"]["text"]) for x in run["results"]] == [
-        ("read", "error", "not a log: it ends after 12 bytes"),
-        ("forbid/SR-LOC-001", "error", "The robot was lost for 12.0 s."),
-        ("limit/error_max_m", "warning", "0.61 m, for 3.0 s"),
+        ("read", "error", "what read demands: not a log: it ends after 12 bytes"),
+        (
+            "forbid/SR-LOC-001",
+            "error",
+            "what forbid/SR-LOC-001 demands: The robot was lost for 12.0 s.",
+        ),
+        ("limit/error_max_m", "warning", "what limit/error_max_m demands: 0.61 m, for 3.0 s"),
     ]
     where = run["results"][2]["locations"][0]["physicalLocation"]["artifactLocation"]
     assert where == {"uri": "logs/b%20c.mcap", "uriBaseId": "SRCROOT"}
@@ -101,7 +105,7 @@ def test_what_failed_is_a_result_and_nothing_else():
     assert [
         (x["level"], x["message"]["text"]) for x in invocation["toolExecutionNotifications"]
     ] == [
-        ("error", "not a log: it ends after 12 bytes"),
+        ("error", "what read demands: not a log: it ends after 12 bytes"),
         ("note", "Not assessable in 1 of 4 logs: no baseline of this log"),
         ("note", "Not assessable in 1 of 4 logs: no map"),
     ]
@@ -159,7 +163,7 @@ def test_texts_of_a_log_are_neither_links_nor_placeholders():
 
     assert "\u202e" not in text
     messages = [found["message"]["text"] for found in run["results"]]
-    assert "{{0}} {{name}} [here] (1) 100%25 %0A, a:b" in messages
+    assert "{{0}} {{name}} [here] (1) 100%25 %0A, a:b: " * 2 in {f"{m}: " for m in messages}
     odd = gated.result(gated.log("a:b?#[%20é.mcap", gated.outcome(value=float("nan"), limit=0.5)))
     (found,) = valid(sarif_text(odd))["results"]
     uri = found["locations"][0]["physicalLocation"]["artifactLocation"]["uri"]
@@ -186,6 +190,8 @@ def test_rules_explain_their_findings():
     assert every.short == "No lost robot"
     assert f"SR-LOC-003: {FINDINGS['SR-LOC-003'].title}." in every.text
     assert "limits" in check_texts("limit/error_max_m", "").full
+    for check in ("limit/error_max_m", "limit/amcl.error_max_m/2", "baseline/error_max_m"):
+        assert "greatest distance of the belief from hindsight" in check_texts(check, "").text
     assert check_texts("of-another-version/x", "").text
 
 

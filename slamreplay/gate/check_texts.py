@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 
 from slamreplay.bundle.findings import FINDINGS
 from slamreplay.evidence.clean import as_markdown, one_line
+from slamreplay.gate.metrics import METRICS
 
 #: GitHub takes 1024 letters of a description.
 _LETTERS = 1_000
@@ -16,6 +18,7 @@ _DEMANDS = {
     "read": "The log can be read.",
     "expect": "What the recipe expects of the log was found.",
     "forbid": "What the recipe forbids was not found in the log.",
+    "assessable": "Something of the log can be assessed.",
     "severity": "No finding that nobody expects is worse than the recipe allows.",
     "limit": "A number of the log keeps the recipe's limit.",
     "baseline": "A number is no worse than in the baseline, by more than chance.",
@@ -26,6 +29,8 @@ _MENDING = {
     "expect": "The recipe lists it under `expect`. Where the log rightly no longer shows it, take "
     "it out of the list.",
     "forbid": "The recipe lists it under `forbid`. Open the log's report for the evidence.",
+    "assessable": "A gate that can assess nothing would pass on nothing. Look at what each check "
+    "says it lacks: a map, scans, a localizer.",
     "severity": "The recipe's `max_severity` says how bad a finding may be. A finding that is "
     "right for this log belongs under `expect`.",
     "limit": "The recipe lists it under `limits`. Open the log's report for the number over time.",
@@ -68,6 +73,11 @@ def check_texts(check: str, title: str) -> CheckTexts:
         ]
     elif ids:
         sections += [(id_, f"{FINDINGS[id_].title}.") for id_ in ids]
+    sections += [
+        (name, f"{METRICS[name].doc}; {METRICS[name].unit or 'without a unit'}.")
+        for name in re.split("[/.]", about)
+        if name in METRICS
+    ]
     told = [(name, one_line(text, 4 * _LETTERS)) for name, text in sections]
     plain = "\n\n".join(f"{name}: {text}" if name else text for name, text in told)
     marked = "\n\n".join(

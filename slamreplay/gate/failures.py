@@ -14,6 +14,11 @@ from slamreplay.geometry.times import decimal_seconds
 _WORST = {"error": 0, "warning": 1, "info": 2}
 
 
+def told(outcome: Outcome) -> str:
+    """What it demands and what was found, for a place that does not show the former."""
+    return ": ".join(text for text in (outcome.title, outcome.message) if text) or outcome.check
+
+
 @dataclass(frozen=True)
 class Failure:
     """A check that failed on a log, or a log that could not be read.

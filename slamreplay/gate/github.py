@@ -6,7 +6,9 @@ actions/runner, ExecutionContext.cs). So checks that fail on many logs share one
 the last one tells what was left out.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from secrets import token_hex
 
 from slamreplay.bundle.findings import Severity
 from slamreplay.evidence.clean import clean, one_line, straight
@@ -14,7 +16,7 @@ from slamreplay.gate.failures import Failure, failures, relative
 from slamreplay.gate.outcome import GateResult
 from slamreplay.gate.step_summary import step_summary
 
-__all__ = ["annotations", "step_summary"]
+__all__ = ["annotations", "artifacts_of", "commands_stopped", "step_summary"]
 
 _COMMAND: dict[Severity, str] = {"error": "error", "warning": "warning", "info": "notice"}
 #: Annotations of one kind that the runner takes from a step.
@@ -51,6 +53,37 @@ def annotations(result: GateResult) -> str:
         )
         lines.append(_command("notice", {"title": "slamreplay gate"}, told))
     return "".join(f"{line}\n" for line in lines)
+
+
+def artifacts_of(environment: Mapping[str, str]) -> str | None:
+    """Address of the page with a run's artifacts, for `step_summary`; None outside of a run.
+
+    A summary is shown beside the artifacts, not among them: a link to a report by its path would
+    lead nowhere.
+    """
+    names = ("GITHUB_SERVER_URL", "GITHUB_REPOSITORY", "GITHUB_RUN_ID")
+    server, repository, run = (environment.get(name) for name in names)
+    if not (server and repository and run):
+        return None
+    return f"{server}/{repository}/actions/runs/{run}#artifacts"
+
+
+@contextmanager
+def commands_stopped(write: Callable[[str], object]) -> Iterator[None]:
+    """While this holds the runner takes no command from the output, whatever a log wrote.
+
+    Other output of the program may quote a log, too, and a terminal's width may fold such a text
+    so that "::" begins a line.
+
+    Args:
+        write: to the output; called with whole lines.
+    """
+    token = token_hex(16)  # nobody who writes a log can know it
+    write(f"::stop-commands::{token}\n")
+    try:
+        yield
+    finally:
+        write(f"::{token}::\n")
 
 
 def _groups(found: list[Failure]) -> list[list[Failure]]:

@@ -10,7 +10,7 @@ import json
 
 from slamreplay.bundle.findings import Severity
 from slamreplay.evidence.clean import clean, one_line, straight
-from slamreplay.gate.failures import Failure, failures, relative
+from slamreplay.gate.failures import Failure, failures, relative, told
 from slamreplay.gate.outcome import GateResult
 
 _SEVERITY: dict[Severity, str] = {"error": "critical", "warning": "major", "info": "minor"}
@@ -32,7 +32,7 @@ def _entry(failure: Failure) -> dict[str, object]:
     outcome = failure.outcome
     unreadable = outcome.status == "error"
     return {
-        "description": one_line(f"{outcome.title}: {outcome.message}", _LETTERS),
+        "description": one_line(told(outcome), _LETTERS),
         "check_name": one_line(outcome.check, _LETTERS),
         "fingerprint": failure.fingerprint,
         "severity": "blocker" if unreadable else _SEVERITY[failure.severity],

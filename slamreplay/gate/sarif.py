@@ -20,7 +20,7 @@ from urllib.parse import quote
 from slamreplay.bundle.findings import Severity
 from slamreplay.evidence.clean import clean, one_line, straight
 from slamreplay.gate.check_texts import check_texts
-from slamreplay.gate.failures import Failure, failures, relative, span_s
+from slamreplay.gate.failures import Failure, failures, relative, span_s, told
 from slamreplay.gate.outcome import GateResult, Outcome
 from slamreplay.version import __version__
 
@@ -139,13 +139,13 @@ def _rule(check: str, outcomes: Sequence[Outcome]) -> dict[str, Any]:
 def _result(failure: Failure, result: GateResult, places: Mapping[str, int]) -> dict[str, Any]:
     outcome = failure.outcome
     numbers = {"value": outcome.value, "limit": outcome.limit}
-    told: dict[str, Any] = {
+    measured: dict[str, Any] = {
         name: value for name, value in numbers.items() if value is not None and math.isfinite(value)
     }
     if outcome.unit:
-        told["unit"] = one_line(outcome.unit, 50)
+        measured["unit"] = one_line(outcome.unit, 50)
     if span := span_s(failure.log, outcome):
-        told["span_s"] = [float(second) for second in span]
+        measured["span_s"] = [float(second) for second in span]
     id_ = _id(outcome.check)
     where = {"physicalLocation": _place(failure.log.log)}
     recipe = {"id": 1, "message": {"text": "The recipe that demands it."}}
@@ -153,12 +153,12 @@ def _result(failure: Failure, result: GateResult, places: Mapping[str, int]) -> 
         "ruleId": id_,
         "ruleIndex": places[id_],
         "level": _LEVEL[failure.severity],
-        "message": {"text": _message(outcome.message or outcome.title)},
+        "message": {"text": _message(told(outcome))},
         "locations": [where],
         "relatedLocations": [{**recipe, "physicalLocation": _place(result.recipe)}],
         # GitHub goes by this name alone; ours is as its own: a hash and how often it has occurred.
         "partialFingerprints": {"primaryLocationLineHash": f"{failure.fingerprint}:{failure.nth}"},
-        **({"properties": told} if told else {}),
+        **({"properties": measured} if measured else {}),
     }
 
 
@@ -166,22 +166,22 @@ def _notifications(
     result: GateResult, found: Sequence[Failure], cut: Mapping[str, int], places: Mapping[str, int]
 ) -> list[dict[str, Any]]:
     unread = [failure for failure in found if failure.outcome.status == "error"]
-    told = [
+    notes = [
         {
-            **_notification("unreadable", "error", failure.outcome.message or "It cannot be read."),
+            **_notification("unreadable", "error", told(failure.outcome)),
             "locations": [{"physicalLocation": _place(failure.log.log)}],
         }
         for failure in unread[:MOST_NOTIFICATIONS]
     ]
     if len(unread) > MOST_NOTIFICATIONS:
         more = f"{len(unread) - MOST_NOTIFICATIONS} more logs could not be read."
-        told.append(_notification("unreadable", "error", more))
+        notes.append(_notification("unreadable", "error", more))
     if any(cut.values()):
         left_out = (
             f"{cut['results']} results and {cut['rules']} rules were left out, the least severe, "
             f"for GitHub shows {MOST_RESULTS} results of a run: junit.xml has them all."
         )
-        told.append(_notification("cut", "warning", left_out))
+        notes.append(_notification("cut", "warning", left_out))
     skipped: dict[str, list[Outcome]] = {}
     for log in result.logs:
         for outcome in log.outcomes:
@@ -192,8 +192,8 @@ def _notifications(
         of_check = _notification("not-assessable", "note", why)
         if check in places:
             of_check["associatedRule"] = {"id": check, "index": places[check]}
-        told.append(of_check)
-    return told
+        notes.append(of_check)
+    return notes
 
 
 def _notification(id_: str, level: str, text: str) -> dict[str, Any]:

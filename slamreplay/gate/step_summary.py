@@ -7,8 +7,8 @@ from urllib.parse import quote
 
 from slamreplay.evidence.clean import as_markdown, clean, one_line
 from slamreplay.evidence.words import STATES
-from slamreplay.gate.failures import Failure, failures
-from slamreplay.gate.outcome import STATUSES, GatedLog, GateResult, Outcome, Status
+from slamreplay.gate.failures import Failure, failures, told
+from slamreplay.gate.outcome import STATUSES, GatedLog, GateResult, Status
 
 #: GitHub refuses a summary of more than 1 MiB (all that one step wrote to it), and shows nothing.
 MOST_BYTES = 1_000_000
@@ -63,7 +63,7 @@ def step_summary(result: GateResult, *, artifacts: str | None = None) -> str:
 
 def _head(result: GateResult) -> str:
     counted = {status: sum(log.status == status for log in result.logs) for status in STATUSES}
-    told = ", ".join(
+    how_many = ", ".join(
         f"{counted[status]} {_WORDS[status]}" for status in STATUSES if counted[status]
     )
     ended = {0: "passed", 1: "failed"}.get(result.exit_code, "could not read every log")
@@ -71,7 +71,7 @@ def _head(result: GateResult) -> str:
     logs = "1 log" if total == 1 else f"{total} logs"
     return (
         f"## Gate: {ended}\n\n{_cell(result.question)}\n\n"
-        f"Of {logs}: {told or 'nothing to tell'}. Recipe: {_cell(result.recipe)}\n"
+        f"Of {logs}: {how_many or 'nothing to tell'}. Recipe: {_cell(result.recipe)}\n"
     )
 
 
@@ -84,7 +84,7 @@ def _by_check(found: Sequence[Failure], result: GateResult) -> list[tuple[str, .
             f"{_cell(check)}<br>{_cell(group[0].outcome.title)}",
             severity,
             f"{len({failure.log.log for failure in group})} of {len(result.logs)}",
-            _quoted((failure.outcome for failure in group), len(group), 1),
+            _quoted((failure.outcome.message for failure in group), len(group), 1),
         )
         for (check, severity), group in groups.items()
     ]
@@ -94,15 +94,15 @@ def _row(log: GatedLog, *, linked: bool) -> tuple[str, ...]:
     name = _cell(log.log)
     if log.report is not None and linked:
         name = f"[{name}]({quote(clean(log.report).strip('/'))}/report.html)"
-    told = [x for x in log.outcomes if x.status in ("error", "failed")]
-    told = told or [x for x in log.outcomes if x.status == "skipped"]
-    why = _quoted(told, len(told), _QUOTED) if told else _cell(log.summary)
+    quoted = [x for x in log.outcomes if x.status in ("error", "failed")]
+    quoted = quoted or [x for x in log.outcomes if x.status == "skipped"]
+    why = _quoted(map(told, quoted), len(quoted), _QUOTED) if quoted else _cell(log.summary)
     state = STATES[log.state].name if log.state in STATES else log.state or ""
     return name, _WORDS[log.status], _cell(state), why
 
 
-def _quoted(outcomes: Iterable[Outcome], count: int, most: int) -> str:
-    lines = [_cell(outcome.message) for _, outcome in zip(range(most), outcomes, strict=False)]
+def _quoted(texts: Iterable[str], count: int, most: int) -> str:
+    lines = [_cell(text) for _, text in zip(range(most), texts, strict=False)]
     if count > most:
         lines.append(f"and {count - most} more")
     return "<br>".join(lines)
