@@ -1,7 +1,6 @@
 """Workers, clients and schedulers that are killed: nothing is lost, and nothing is there twice."""
 
 import json
-import signal
 
 import pytest
 from batch_folders import (
