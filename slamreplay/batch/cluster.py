@@ -5,9 +5,12 @@ from __future__ import annotations
 import logging
 import pkgutil
 import platform
+import signal
+import sys
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
+from multiprocessing import resource_tracker
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,7 +18,7 @@ from slamreplay.errors import SlamreplayError, UsageError
 from slamreplay.version import __version__
 
 if TYPE_CHECKING:
-    from distributed import Client
+    from distributed import Client, LocalCluster
 
 #: How long a scheduler is looked for, and how long a worker of it is waited for, s.
 _CONNECT_S, _FIRST_WORKER_S = 10.0, 60.0
@@ -88,25 +91,27 @@ def connected(workers: Workers, scratch: Path) -> Iterator[Client]:
         ClusterError: nobody answers at the address, or somebody with other versions.
         UsageError: the address is none.
     """
-    with _quiet():
-        client = (
-            _local(workers, scratch)
-            if workers.scheduler is None
-            else _reached(workers.scheduler, _CONNECT_S)
-        )
-        try:
-            yield client
-        finally:
-            _close(client)
+    from distributed import Client
+
+    with _quiet(), ExitStack() as ends:
+        if workers.scheduler is None:
+            with _interrupts_later():
+                cluster = _local(workers, scratch)
+                ends.callback(_close, cluster)
+            client = Client(cluster, set_as_default=False)
+        else:
+            client = _reached(workers.scheduler, _CONNECT_S)
+        ends.callback(_close, client)
+        yield client
 
 
-def _local(workers: Workers, scratch: Path) -> Client:
+def _local(workers: Workers, scratch: Path) -> LocalCluster:
     import dask
-    from distributed import Client, LocalCluster
+    from distributed import LocalCluster
 
     limit = {} if workers.memory_limit is None else {"memory_limit": workers.memory_limit}
     with dask.config.set(_LOCAL):
-        cluster = LocalCluster(
+        return LocalCluster(
             n_workers=workers.count,
             threads_per_worker=1,
             processes=True,
@@ -117,7 +122,23 @@ def _local(workers: Workers, scratch: Path) -> Client:
             preload=["slamreplay.batch.own_worker"],
             **limit,
         )
-        return Client(cluster)
+
+
+@contextmanager
+def _interrupts_later() -> Iterator[None]:
+    """Ctrl-C takes effect after the block, and never in threads and processes that begin in it.
+
+    A terminal sends it to the workers, too, and to those that are started in their place later.
+    """
+    if sys.platform == "win32":
+        yield
+        return
+    resource_tracker.ensure_running()  # or else the first process's thread lets signals in again
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _reached(address: str, patience_s: float) -> Client:
@@ -196,14 +217,10 @@ def _numbers(client: Client) -> dict[str, str | None]:
     return {name: v if isinstance(v, str) else None for name, v in told.items()}
 
 
-def _close(client: Client) -> None:
+def _close(ended: Client | LocalCluster) -> None:
     """Say goodbye; who is gone already hears none."""
-    cluster = client.cluster
     with suppress(Exception):
-        client.close(timeout=_CLOSE_S)
-    if cluster is not None:
-        with suppress(Exception):
-            cluster.close(timeout=_CLOSE_S)
+        ended.close(timeout=_CLOSE_S)
 
 
 def _bytes(text: str) -> int:

@@ -18,6 +18,8 @@ from slamreplay.batch.worker import failed, line_of, look_back
 if TYPE_CHECKING:
     from distributed import Client, Future
 
+    _Ended = tuple[Future, LogResult | Exception]
+
 #: How often is looked whether the cluster still lives, s.
 _LOOK_S = 1.0
 #: How long a scheduler that went away is looked for, and how long workers may be missing, s.
@@ -49,7 +51,7 @@ def looked_back(tasks: Sequence[LogTask], workers: Workers, scratch: Path) -> Ge
     while work.left:
         try:
             with connected(workers, scratch) as client:
-                for result in _served(client, work, workers):
+                for result in served(client, work, workers):
                     lost = None
                     yield result
         except _LostError:
@@ -64,7 +66,7 @@ def looked_back(tasks: Sequence[LogTask], workers: Workers, scratch: Path) -> Ge
             time.sleep(_LOOK_S)
 
 
-def _served(client: Client, work: Work, workers: Workers) -> Iterator[LogResult]:
+def served(client: Client, work: Work, workers: Workers) -> Iterator[LogResult]:
     """Results until nothing is left.
 
     Raises:
@@ -72,20 +74,20 @@ def _served(client: Client, work: Work, workers: Workers) -> Iterator[LogResult]
         ClusterError: no worker came for a long time.
     """
     out: dict[Future, LogTask] = {}
-    ended: SimpleQueue[Future] = SimpleQueue()
+    ended: SimpleQueue[_Ended] = SimpleQueue()
     seen = looked = time.monotonic()
     threads = _threads(client)
     while work.left:
         while (task := work.next(threads)) is not None:
             future = _sent(client, task)
             out[future] = task
-            future.add_done_callback(ended.put)
+            client.loop.add_callback(_fetch, client, future, ended)
         try:
-            future = ended.get(timeout=_LOOK_S)
+            end = ended.get(timeout=_LOOK_S)
         except Empty:
-            future = None
+            end = None
         now = time.monotonic()
-        if future is None or now - looked > _LOOK_S:
+        if end is None or now - looked > _LOOK_S:
             threads, looked = _threads(client), now
             seen = now if threads else seen
             if now - seen > WITHOUT_WORKERS_S:
@@ -94,12 +96,25 @@ def _served(client: Client, work: Work, workers: Workers) -> Iterator[LogResult]
                 )
             if any(sent.cancelled() for sent in out):
                 raise _LostError
-        if future is not None:
-            task = out.pop(future)
-            result = _outcome(future, task, work, workers)
+        if end is not None:
+            future, came = end
+            result = _outcome(came, out.pop(future), work, workers)
             future.release()
             if result is not None:
                 yield result
+
+
+async def _fetch(client: Client, future: Future, ended: SimpleQueue[_Ended]) -> None:
+    """Put what a task ends with into the queue: no dead worker may hold up the results of others.
+
+    One that dies before its result was fetched is asked for it for half a minute; then dask has
+    the task done again.
+    """
+    try:
+        (result,) = await client.gather([future], asynchronous=True)
+        ended.put((future, result))
+    except Exception as error:
+        ended.put((future, error))
 
 
 def _sent(client: Client, task: LogTask) -> Future:
@@ -121,25 +136,25 @@ def _threads(client: Client) -> int:
     raise _LostError
 
 
-def _outcome(future: Future, task: LogTask, work: Work, workers: Workers) -> LogResult | None:
+def _outcome(
+    came: LogResult | Exception, task: LogTask, work: Work, workers: Workers
+) -> LogResult | None:
     """The result of a task that ended; None if it goes out again."""
     from distributed import CancelledError, KilledWorker
 
-    try:
-        result: LogResult = future.result()
-    except KilledWorker as error:
-        if not work.died(task.key, error.allowed_failures + 1):
-            return None
+    if isinstance(came, LogResult):
+        work.done(task.key)
+        return _with_attempts(came, work.deaths[task.key] + 1)
+    if isinstance(came, (CancelledError, OSError, TimeoutError)):
+        raise _LostError from came
+    deaths = came.allowed_failures + 1 if isinstance(came, KilledWorker) else 1
+    if not work.died(task.key, deaths):
+        return None
+    if isinstance(came, KilledWorker):
         line = f"its worker died {work.deaths[task.key]} times (hint: {_memory_hint(workers)})"
-        return _with_attempts(failed(task, line), work.deaths[task.key])
-    except (CancelledError, OSError, TimeoutError) as error:
-        raise _LostError from error
-    except Exception as error:  # `look_back` raises nothing: it was not even begun
-        if not work.died(task.key):
-            return None
-        return _with_attempts(failed(task, line_of(error)), work.deaths[task.key])
-    work.done(task.key)
-    return _with_attempts(result, work.deaths[task.key] + 1)
+    else:  # `look_back` raises nothing: it was not even begun
+        line = line_of(came)
+    return failed(task, line)
 
 
 def _memory_hint(workers: Workers) -> str:

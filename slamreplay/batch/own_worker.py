@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import os
-import signal
 import sys
 from typing import Any
 
 
 def dask_setup(worker: Any) -> None:  # noqa: ARG001 - as dask calls it
-    """Leave the terminal to the client: Ctrl-C is its, and so is what is said on stderr."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    """Leave the terminal to the client."""
     sys.stderr.flush()
     silence = os.open(os.devnull, os.O_WRONLY)
     for stream in (1, 2):

@@ -74,8 +74,8 @@ def _batch(
     from slamreplay.cli.progress import progress_bar
 
     who = Workers(workers, memory_limit, scheduler).checked()
-    tasks = [task_of(source, cause=cause) for source in sources_of(places, tell=complain)]
     try:
+        tasks = [task_of(source, cause=cause) for source in sources_of(places, tell=complain)]
         with progress_bar("looking back") as progress:
             end = run_batch(tasks, output, who, again_failed=again_failed, progress=progress)
     except KeyboardInterrupt:
