@@ -93,8 +93,8 @@ def test_links_are_followed_once(fleet):
     told = []
     assert names(["logs"], tell=told.append)[1:] == ALL[1:]
     assert told == [
-        "logs: 1 folders that links lead to a second time skipped",
-        "logs: 1 links that lead nowhere skipped",
+        "logs: skipped 1 folders that links lead to a second time",
+        "logs: skipped 1 links that lead nowhere",
     ]
 
 
@@ -109,7 +109,7 @@ def test_folders_that_cannot_be_read_are_counted(fleet, monkeypatch):
     monkeypatch.setattr(os, "scandir", refuse)
     told = []
     assert names(["logs"], tell=told.append) == ALL[:3]
-    assert told == ["logs: 1 folders that cannot be read (Permission denied) skipped"]
+    assert told == ["logs: skipped 1 folders that cannot be read (Permission denied)"]
     with pytest.raises(LogError, match=r"^logs/south: cannot read: Permission denied$"):
         sources_of(["logs/south"])
 
