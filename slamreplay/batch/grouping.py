@@ -34,11 +34,17 @@ class Group:
         """Of one of its files: the path within the folder, or the file's own name."""
         return member[len(self.path) + 1 :] if self.folder else member.rpartition("/")[2]
 
-    def fits(self, pattern: Pattern) -> bool:
-        """Whether a pattern names the log: itself, a folder it lies in, or one of its files."""
-        parts = self.path.split("/")
+    def fits(self, pattern: Pattern, root: str) -> bool:
+        """Whether a pattern below `root` names it: itself, a folder it is in, or one of its files.
+
+        Args:
+            pattern: of what comes after the root.
+            root: the folder, with a slash at its end.
+        """
+        members = (member[len(root) :] for member in self.members)
+        parts = self.path[len(root) :].split("/")
         above = ("/".join(parts[:n]) for n in range(1, len(parts) + 1))
-        return any(pattern.match(path) is not None for path in (*self.members, *above))
+        return any(pattern.match(path) is not None for path in (*members, *above))
 
 
 def is_log_name(name: str) -> bool:

@@ -30,8 +30,9 @@ def local_logs(place: str, tell: Callable[[str], None]) -> list[LogSource]:
         raise UsageError("a place without a name" if not place else "a name with a zero byte")
     where = absolute(place)
     if not os.path.lexists(where) and is_pattern(place):
-        folder = fixed_folder(place) or "."
-        return _below(absolute(folder), os.path.normpath(folder), pattern_of(where), tell)
+        folder = fixed_folder(place)
+        pattern = pattern_of(place[len(folder) :])
+        return _below(absolute(folder or "."), os.path.normpath(folder or "."), pattern, tell)
     if Path(where).is_dir():
         return _below(where, os.path.normpath(place), None, tell)
     try:
@@ -47,18 +48,14 @@ def _below(
 ) -> list[LogSource]:
     """The logs below a folder, all of them or those that fit."""
     skipped: Counter[str] = Counter()
-    parts = () if root == "/" else tuple(root.split("/"))[1:]
-
-    def reaches(folder: tuple[str, ...]) -> bool:
-        return pattern is None or pattern.reaches(("", *parts, *folder))
-
+    reaches = (lambda _folder: True) if pattern is None else pattern.reaches
     try:
         paths = list(files_below(root, reaches, lambda why: skipped.update([why])))
     except LogError as error:
         raise LogError(error.what, where=printable(name)) from error
     sources = []
     for group in logs_among(paths):
-        if pattern is not None and not group.fits(pattern):
+        if pattern is not None and not group.fits(pattern, root.rstrip("/") + "/"):
             continue
         rest = group.path[len(root) :].strip("/")
         try:

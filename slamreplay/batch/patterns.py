@@ -112,7 +112,8 @@ def pattern_of(text: str, *, anywhere: bool = False) -> Pattern:
         parts = (None, *parts)
     squeezed = tuple(p for i, p in enumerate(parts) if p or not i or parts[i - 1])
     if sum(part is None for part in squeezed) > MAX_ANY_DEPTH:
-        raise UsageError(f"the pattern '{text}' has more than {MAX_ANY_DEPTH - 1} times **")
+        raise UsageError(f"the pattern '{text}' has too many **",
+                         hint="one stands for any number of parts")  # fmt: skip
     found = Pattern(text, squeezed)
     if len(set(found.names)) < len(found.names):
         twice = next(n for n in found.names if found.names.count(n) > 1)

@@ -32,8 +32,8 @@ def remote_logs(
     """
     pattern, prefix, root = None, "", place.rstrip("/") + "/"
     if is_pattern(place):
-        pattern = pattern_of(shown(place))
         root = fixed_folder(place)
+        pattern = pattern_of(shown(place)[len(shown(root)) :])
         if root.count("/") < 3:
             raise UsageError("a pattern needs the host or bucket before it", where=shown(place))
         prefix = fixed_text(place)[len(root) :]
@@ -45,19 +45,20 @@ def remote_logs(
     skipped: Counter[str] = Counter()
     files = remote_below(
         root, storage, prefix=prefix,
-        reaches=lambda url: pattern is None or pattern.reaches(url.rstrip("/").split("/")),
+        reaches=lambda url: pattern is None
+        or pattern.reaches(url[len(shown(root)) :].rstrip("/").split("/")),
         skipped=lambda why: skipped.update([why]),
     )  # fmt: skip
     for why, count in sorted(skipped.items()):
         tell(f"{shown(root)}: skipped {count} {why}")
-    return _sources(files, pattern, storage)
+    return _sources(files, pattern, shown(root), storage)
 
 
 def _sources(
-    files: list[RemoteFile], pattern: Pattern | None, storage: Mapping[str, object]
+    files: list[RemoteFile], pattern: Pattern | None, root: str, storage: Mapping[str, object]
 ) -> list[LogSource]:
     by_path = {path: file for file in files if "/." not in (path := shown(file.url))}
-    groups = [g for g in logs_among(by_path) if pattern is None or g.fits(pattern)]
+    groups = [g for g in logs_among(by_path) if pattern is None or g.fits(pattern, root)]
     wanted = [path for group in groups for path in group.members]
     if any(scheme_of(path) in _WEB for path in wanted):
         asked = remote_files([by_path[path].url for path in wanted], storage)
