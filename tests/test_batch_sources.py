@@ -80,6 +80,15 @@ def test_a_pattern_looks_only_into_folders_it_reaches(fleet, monkeypatch):
     assert {Path(p).name for p in seen} == {"north", "amr-1", "amr-2"}
 
 
+def test_wildcards_in_the_names_of_folders_that_are_there_are_no_pattern(fleet, monkeypatch):
+    odd = fleet / "[old] {x}"
+    odd.mkdir()
+    (odd / "a.mcap").write_bytes(b"a")
+    monkeypatch.chdir(odd)
+    assert names(["*.mcap"]) == ["a.mcap"]
+    assert names([str(odd)]) == [f"{odd}/a.mcap"]
+
+
 def test_a_file_that_is_named_itself_is_taken_whatever_it_is_called(fleet):
     (fleet / "odd.log").write_bytes(b"x")
     assert names(["logs/odd.log"]) == ["logs/odd.log"]
@@ -93,8 +102,8 @@ def test_links_are_followed_once(fleet):
     told = []
     assert names(["logs"], tell=told.append)[1:] == ALL[1:]
     assert told == [
-        "logs: 1 folders that links lead to a second time skipped",
-        "logs: 1 links that lead nowhere skipped",
+        "logs: skipped 1 folders that links lead to a second time",
+        "logs: skipped 1 links that lead nowhere",
     ]
 
 
@@ -109,7 +118,7 @@ def test_folders_that_cannot_be_read_are_counted(fleet, monkeypatch):
     monkeypatch.setattr(os, "scandir", refuse)
     told = []
     assert names(["logs"], tell=told.append) == ALL[:3]
-    assert told == ["logs: 1 folders that cannot be read (Permission denied) skipped"]
+    assert told == ["logs: skipped 1 folders that cannot be read (Permission denied)"]
     with pytest.raises(LogError, match=r"^logs/south: cannot read: Permission denied$"):
         sources_of(["logs/south"])
 

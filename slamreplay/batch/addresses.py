@@ -5,12 +5,17 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Iterable
-from urllib.parse import unquote, urlsplit, urlunsplit
+from urllib.parse import unquote
 
 _SCHEME = re.compile(r"([a-z][a-z0-9+.-]*)://", re.IGNORECASE)
 #: What may stand within a sentence of a library: an address, up to a blank or a quote.
 _ANY_ADDRESS = re.compile(r"[a-z][a-z0-9+.-]*://[^\s'\"<>]+", re.IGNORECASE)
 _SHORTEST_SECRET = 4
+_WEB = ("http", "https")
+#: Azure writes container@account where others have a user.
+_CONTAINER_AT_HOST = ("abfs", "abfss")
+#: By whether it is an address of the web: names in a bucket may hold a ? or a #.
+_QUERY = {True: re.compile(r"[?#].*", re.DOTALL), False: re.compile(r"\?[^/?=]*=.*", re.DOTALL)}
 
 
 def scheme_of(place: str) -> str:
@@ -28,7 +33,7 @@ def local_path(place: str) -> str:
     """The path that `file://` addresses and paths name, as it is given."""
     if scheme_of(place) != "file":
         return place
-    return unquote(urlsplit(place).path) or "/"
+    return "/" + unquote(place.split("://", 1)[1].partition("/")[2])
 
 
 def shown(place: str) -> str:
@@ -36,13 +41,12 @@ def shown(place: str) -> str:
 
     A signed query is a password, and which query is one cannot be told; so none is shown.
     """
-    if scheme_of(place):
-        parts = urlsplit(place)
-        has_query = parts.scheme in ("http", "https", "s3")
-        path = parts.path if has_query else place.split("://", 1)[1].partition("/")[2]
-        if not has_query:
-            path = "/" + path
-        place = urlunsplit((parts.scheme, parts.netloc.rpartition("@")[2], path, "", ""))
+    scheme = scheme_of(place)
+    if scheme:
+        host, slash, path = place.split("://", 1)[1].partition("/")
+        if scheme not in _CONTAINER_AT_HOST:
+            host = host.rpartition("@")[2]
+        place = f"{scheme}://" + _QUERY[scheme in _WEB].sub("", host + slash + path)
     return printable(place)
 
 
@@ -68,11 +72,21 @@ def without_secrets(text: str, secrets: Iterable[object] = ()) -> str:
 
 def name_of(place: str) -> str:
     """The last part of a path or address, without its query."""
-    if scheme_of(place) in ("http", "https"):
-        return unquote(urlsplit(place).path).rstrip("/").rpartition("/")[2]
+    if scheme_of(place) in _WEB:
+        path = place.split("://", 1)[1].partition("/")[2]
+        return unquote(_QUERY[True].sub("", path).rstrip("/").rpartition("/")[2])
     return place.rstrip("/").rpartition("/")[2]
 
 
 def absolute(path: str) -> str:
     """An absolute path; links in it stay, for they are the name the user knows."""
     return os.path.abspath(path)  # noqa: PTH100 - pathlib keeps `..`
+
+
+def beside(table: str, given: str | None) -> str | None:
+    """What a file at `table` names: a path relative to it, or one that stands for itself."""
+    if given is None or scheme_of(given) or given.startswith("/"):
+        return given
+    if scheme_of(table) not in ("", "file"):
+        return f"{table.partition('?')[0].rpartition('/')[0]}/{given}"
+    return os.path.join(os.path.dirname(local_path(table)), given)  # noqa: PTH118, PTH120

@@ -7,6 +7,8 @@ from collections import defaultdict
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+from slamreplay.batch.patterns import Pattern
+
 #: rosbag2 packs whole files with zstd, people pack text with the others.
 _LOG = re.compile(r"\.(bag|mcap|db3|clf)(\.(zstd|zst))?\Z|\.clf\.(gz|bz2)\Z")
 _STORAGE = re.compile(r"\.(db3|mcap)(\.(zstd|zst))?\Z")
@@ -27,6 +29,22 @@ class Group:
     path: str
     folder: str
     members: tuple[str, ...]
+
+    def name_of(self, member: str) -> str:
+        """Of one of its files: the path within the folder, or the file's own name."""
+        return member[len(self.path) + 1 :] if self.folder else member.rpartition("/")[2]
+
+    def fits(self, pattern: Pattern, root: str) -> bool:
+        """Whether a pattern below `root` names it: itself, a folder it is in, or one of its files.
+
+        Args:
+            pattern: of what comes after the root.
+            root: the folder, with a slash at its end.
+        """
+        members = (member[len(root) :] for member in self.members)
+        parts = self.path[len(root) :].split("/")
+        above = ("/".join(parts[:n]) for n in range(1, len(parts) + 1))
+        return any(pattern.match(path) is not None for path in (*members, *above))
 
 
 def is_log_name(name: str) -> bool:

@@ -19,7 +19,7 @@ from slamreplay.errors import UsageError
 MAX_LENGTH, MAX_ANY_DEPTH = 1000, 4
 _NAME = re.compile(r"[a-z][a-z0-9_]{0,39}")
 _TOKEN = re.compile(r"\*+|\?|\[!?\]?[^\]/]*\]|\{[^{}/]*\}|\{|\}")
-_MAGIC = re.compile(r"[*?\[{]")
+_WILDCARD = re.compile(r"[*?\[]")
 _PLACE = re.compile(r"\{([^{}/]*)\}")
 
 
@@ -74,13 +74,19 @@ def is_pattern(text: str) -> bool:
     """Whether a path or address holds wildcards; a `?` of http begins its query."""
     if scheme_of(text) in ("http", "https"):
         text = text.replace("?", "")
-    return bool(re.search(r"[*?\[]", text))
+    return bool(_WILDCARD.search(text))
+
+
+def fixed_text(text: str) -> str:
+    """What stands before the first wildcard."""
+    found = _WILDCARD.search(text)
+    return text[: found.start()] if found else text
 
 
 def fixed_folder(text: str) -> str:
     """The folder before the first part that holds a wildcard, with its slash; empty if none."""
-    found = _MAGIC.search(text)
-    return text[: text.rfind("/", 0, found.start()) + 1] if found else text
+    fixed = fixed_text(text)
+    return fixed[: fixed.rfind("/") + 1]
 
 
 @lru_cache(maxsize=1024)
@@ -106,7 +112,8 @@ def pattern_of(text: str, *, anywhere: bool = False) -> Pattern:
         parts = (None, *parts)
     squeezed = tuple(p for i, p in enumerate(parts) if p or not i or parts[i - 1])
     if sum(part is None for part in squeezed) > MAX_ANY_DEPTH:
-        raise UsageError(f"the pattern '{text}' has more than {MAX_ANY_DEPTH - 1} times **")
+        raise UsageError(f"the pattern '{text}' has too many **",
+                         hint="one stands for any number of parts")  # fmt: skip
     found = Pattern(text, squeezed)
     if len(set(found.names)) < len(found.names):
         twice = next(n for n in found.names if found.names.count(n) > 1)

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from slamreplay.batch.addresses import local_path, scheme_of, shown
 from slamreplay.batch.local_files import cannot_read
+from slamreplay.batch.stores import file_system, store_error
 from slamreplay.errors import LogError, UsageError
 
 
@@ -28,18 +29,36 @@ def read_small(place: str, storage: Mapping[str, object], *, most: int) -> bytes
         LogError: it cannot be read.
         UsageError: it is no file, or larger.
     """
-    if scheme_of(place) not in ("", "file"):
-        raise UsageError("addresses are not read yet", where=shown(place))
+    is_remote = scheme_of(place) not in ("", "file")
+    content = _remote(place, storage, most) if is_remote else _local(place, most)
+    if len(content) > most:
+        raise UsageError(f"larger than {most / 1e6:g} MB", where=shown(place))
+    return content
+
+
+def _local(place: str, most: int) -> bytes:
     path = Path(local_path(place))
     try:
         if path.exists() and not path.is_file():  # a pipe would wait for ever
             raise UsageError("not a file", where=shown(place))
         with path.open("rb") as stream:
-            content = stream.read(most + 1)
+            return stream.read(most + 1)
     except (OSError, ValueError) as error:  # ValueError: a zero byte in the name
         if not isinstance(error, OSError) or error.errno in (errno.ENOENT, errno.ENOTDIR):
             raise NotThereError("no such file", where=shown(place)) from error
         raise cannot_read(shown(place), error) from error
-    if len(content) > most:
-        raise UsageError(f"larger than {most / 1e6:g} MB", where=shown(place))
+
+
+def _remote(place: str, storage: Mapping[str, object], most: int) -> bytes:
+    store = file_system(place, storage)
+    try:
+        size = store.info(place).get("size")
+        if size is not None and size > most:
+            return bytes(most + 1)
+        content: bytes = store.cat_file(place)
+    except Exception as error:
+        told = store_error(error, place, storage)
+        if told.is_missing:
+            raise NotThereError("no such file", where=shown(place)) from error
+        raise told from error
     return content

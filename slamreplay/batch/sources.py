@@ -3,53 +3,65 @@
 from __future__ import annotations
 
 import os
-from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 
-from slamreplay.batch.addresses import absolute, local_path, printable, scheme_of, shown
-from slamreplay.batch.grouping import Group, logs_among
-from slamreplay.batch.local_files import cannot_read, files_below, fingerprint
-from slamreplay.batch.patterns import Pattern, fixed_folder, is_pattern, pattern_of
-from slamreplay.batch.task import LogFile, LogSource
-from slamreplay.errors import LogError, SlamreplayError, UsageError
+from slamreplay.batch.addresses import local_path, scheme_of, shown
+from slamreplay.batch.local_logs import local_logs
+from slamreplay.batch.manifests import Entry, is_manifest, read_manifest
+from slamreplay.batch.maps_table import MapsTable
+from slamreplay.batch.remote_logs import remote_logs
+from slamreplay.batch.task import LogSource
+from slamreplay.errors import LogError, SlamreplayError
 
+_AT_ONCE = 16
+_HINT = "a .bag, .mcap, .db3 or .clf, a folder of rosbag2 or MRCLAM, or a bundle"
 Tell = Callable[[str], None]
-
-
-def _silent(_remark: str) -> None:
-    pass
 
 
 def sources_of(
     places: Sequence[str],
-    maps: None = None,
+    maps: MapsTable | None = None,
     storage: Mapping[str, object] | None = None,
     *,
-    tell: Tell = _silent,
+    tell: Tell = lambda _remark: None,
 ) -> list[LogSource]:
     """The logs behind what a command line names, each once, sorted by address.
 
+    A place is a file; a folder, of which all logs below it are taken; a pattern (`patterns`), which
+    names logs, folders they lie in, or files of them; an address of one of these in a store that
+    fsspec reaches, or of an index page; or a manifest of such places (`manifests`). In folders and
+    stores logs are known by their names (`grouping`); a file that is named itself is always taken.
+    Names that begin with a dot are left out.
+
     Args:
-        places: files, folders, patterns.
-        maps: a table that gives logs their map, topics, robot and labels.
-        storage: options of fsspec for addresses.
-        tell: told in a sentence what was skipped, with a count.
+        places: as above.
+        maps: what is known of the logs beside.
+        storage: options of fsspec, as of `stores.storage_options`.
+        tell: told in one sentence each what was skipped or of no use, with a count.
 
     Raises:
-        LogError: a place cannot be read, or there is no log at all.
-        UsageError: a place that makes no sense.
+        LogError: a place does not exist or cannot be read, or there is no log at all.
+        UsageError: a place or a manifest that makes no sense.
     """
     found: dict[str, LogSource] = {}
     for place in places:
-        for source in _of_place(place, tell):
+        logs = _of_place(place, storage or {}, tell)
+        if not logs and len(places) > 1:
+            tell(f"{shown(place)}: no log there")
+        for source in logs:
             found.setdefault(_identity(source), source)
     if not found:
-        raise LogError(
-            "no log there", where=", ".join(shown(p) for p in places[:3]) or None,
-            hint="a .bag, .mcap, .db3 or .clf, a folder of rosbag2 or MRCLAM, or a bundle",
-        )  # fmt: skip
-    return sorted(found.values(), key=lambda source: (source.log, source.files[0].url))
+        raise LogError("no log there", where=", ".join(shown(p) for p in places[:3]) or None,
+                       hint=_HINT)  # fmt: skip
+    sources = sorted(found.values(), key=lambda source: (source.log, source.files[0].url))
+    if maps is not None:
+        sources, remarks = maps.applied(sources)
+        for remark in remarks:
+            tell(remark)
+    return sources
 
 
 def _identity(source: LogSource) -> str:
@@ -58,76 +70,49 @@ def _identity(source: LogSource) -> str:
     return url if scheme_of(url) else os.path.realpath(url)
 
 
-def _of_place(place: str, tell: Tell) -> list[LogSource]:
+def _of_place(place: str, storage: Mapping[str, object], tell: Tell) -> list[LogSource]:
+    is_remote = scheme_of(place) not in ("", "file")
+    if is_manifest(place) and (is_remote or not Path(local_path(place)).is_dir()):
+        return _of_manifest(place, storage, tell)
+    return _of_log(place, storage, tell)
+
+
+def _of_log(place: str, storage: Mapping[str, object], tell: Tell) -> list[LogSource]:
     if scheme_of(place) not in ("", "file"):
-        raise UsageError("addresses are not read yet", where=shown(place))
-    return _local(local_path(place), tell)
+        return remote_logs(place, storage, tell)
+    return local_logs(local_path(place), tell)
 
 
-def _local(place: str, tell: Tell) -> list[LogSource]:
-    if not place or "\0" in place:
-        raise UsageError("a place without a name" if not place else "a name with a zero byte")
-    where = absolute(place)
-    if not os.path.lexists(where) and is_pattern(place):
-        return _below(*_root(place), pattern_of(where), tell)
-    if os.path.isdir(where):  # noqa: PTH112 - texts
-        return _below(where, os.path.normpath(place), None, tell)
-    try:
-        Path(where).stat()
-    except OSError as error:
-        raise cannot_read(place, error) from error
-    members = [where] + ([f"{where}-wal"] if Path(f"{where}-wal").is_file() else [])
-    return [_source(Group(where, "", tuple(members)), os.path.normpath(place))]
+def _of_manifest(place: str, storage: Mapping[str, object], tell: Tell) -> list[LogSource]:
+    """The logs of all lines; lines that name none are counted."""
 
-
-def _root(pattern: str) -> tuple[str, str]:
-    """The folder before the first wildcard: absolute, and as it is shown."""
-    folder = fixed_folder(pattern) or "."
-    return absolute(folder), os.path.normpath(folder)
-
-
-def _below(root: str, name: str, pattern: Pattern | None, tell: Tell) -> list[LogSource]:
-    """The logs below a folder, all of them or those that fit."""
-    skipped: Counter[str] = Counter()
-    parts = () if root == "/" else tuple(root.split("/"))[1:]
-
-    def reaches(folder: tuple[str, ...]) -> bool:
-        return pattern is None or pattern.reaches(("", *parts, *folder))
-
-    try:
-        paths = list(files_below(root, reaches, lambda why: skipped.update([why])))
-    except LogError as error:
-        raise LogError(error.what, where=printable(name)) from error
-    for why, count in sorted(skipped.items()):
-        tell(f"{printable(name)}: {count} {why} skipped")
-    sources = []
-    for group in logs_among(paths):
-        if pattern is not None and not fits(pattern, group):
-            continue
-        rest = group.path[len(root) :].strip("/")
+    def one(entry: Entry) -> tuple[list[LogSource], list[str], SlamreplayError | None]:
+        remarks: list[str] = []
         try:
-            sources.append(_source(group, os.path.normpath(os.path.join(name, rest))))  # noqa: PTH118
+            return _of_log(entry.place, storage, remarks.append), remarks, None
         except SlamreplayError as error:
-            tell(f"skipped: {error}")
-    return sources
+            return [], remarks, error
 
-
-def fits(pattern: Pattern, group: Group) -> bool:
-    """Whether a pattern names a log: itself, a folder it lies in, or one of its files."""
-    parts = group.path.split("/")
-    above = ("/".join(parts[:n]) for n in range(1, len(parts) + 1))
-    return any(pattern.match(path) is not None for path in (*group.members, *above))
-
-
-def _source(group: Group, name: str) -> LogSource:
-    files = tuple(_file(path, group) for path in group.members)
-    return LogSource(log=printable(name), files=files, folder=group.folder)
-
-
-def _file(path: str, group: Group) -> LogFile:
-    name = path[len(group.path) :].strip("/") if group.folder else path.rpartition("/")[2]
-    try:
-        size = Path(path).stat().st_size
-    except OSError as error:
-        raise cannot_read(path, error) from error
-    return LogFile(url=path, name=name, size=size, version=fingerprint(Path(path)))
+    entries = read_manifest(place, storage)
+    with ThreadPoolExecutor(_AT_ONCE) as pool:  # a store answers many questions at once
+        answers = list(pool.map(one, entries))
+    found: list[LogSource] = []
+    empty = []
+    for entry, (sources, remarks, error) in zip(entries, answers, strict=True):
+        for remark in remarks:
+            tell(remark)
+        if not sources:
+            empty.append((entry, error))
+        found += [
+            replace(s, labels=entry.labels, map=entry.map, topics=entry.topics, robot=entry.robot)
+            for s in sources
+        ]
+    if empty:
+        entry, error = empty[0]
+        why = error or f"{shown(entry.place)}: no log there"
+        remark = f"{shown(place)}: {len(empty)} of {len(entries)} lines name no log: row "
+        remark += f"{entry.line}: {why}" + (" (and others)" if len(empty) > 1 else "")
+        if not found:
+            raise LogError(remark.partition(": ")[2], where=shown(place))
+        tell(remark)
+    return found
