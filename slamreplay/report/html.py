@@ -41,12 +41,9 @@ def html(post: Postmortem) -> str:
     pictures = _pictures(post, view)
     return render(
         "report.html.j2",
+        {"page": view, "replay": replay, "sections": sections(view, pictures), **pictures},
         styles=[*texts(_STYLES), print_style(view.title)],
         scripts=[] if replay is None else ["\n".join(texts(_SCRIPTS))],
-        page=view,
-        replay=replay,
-        sections=sections(view, pictures),
-        **pictures,
     )
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import base64
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from importlib.resources import files
 
 from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
@@ -17,20 +17,20 @@ _PACKAGE = "slamreplay.report"
 
 def render(
     template: str,
+    values: Mapping[str, object],
     *,
     styles: Sequence[str],
     scripts: Sequence[str],
     package: str = _PACKAGE,
-    **values: object,
 ) -> str:
     """The text of a page. Whatever came from a log is escaped by the template engine.
 
     Args:
         template: its name; it prints `policy`, `styles` and `scripts` as they are.
+        values: what else it prints.
         styles: style sheets, each to stand in an element of its own.
         scripts: modules, likewise.
         package: whose `templates` are looked through before the report's own.
-        values: what the template prints.
     """
     environment = Environment(
         loader=ChoiceLoader([PackageLoader(name) for name in dict.fromkeys((package, _PACKAGE))]),
