@@ -199,6 +199,7 @@ class Area:
             confirm the map again.
         near_h: time of all robots within `NEAR_M` of it, h.
         lost_near_s: time lost there.
+        lost_near: logs in which the robot was lost there.
         in_use: whether its map still was at the end of what is known of the site.
         advice: re-map: it stays that way, by more than one robot or log; temporary: the map was
             found right again; watch: neither is known yet.
@@ -222,6 +223,7 @@ class Area:
     latest: int
     near_h: float
     lost_near_s: float
+    lost_near: int
     in_use: bool
     advice: Advice
     why: str
@@ -342,6 +344,17 @@ class MapPlaces:
 
 
 @dataclass(frozen=True)
+class Failure:
+    """A log that could not be read or judged; `error` is the line that says why."""
+
+    key: str
+    log: str
+    site: str | None
+    robot: str | None
+    error: str
+
+
+@dataclass(frozen=True)
 class Copies:
     """One log under several names or keys; only `counted` counts.
 
@@ -370,7 +383,10 @@ class Answers:
         steps: what changed from one software version to the next.
         maps: one per site and map version, those in use first, most logs first.
         copies: logs that occur more than once.
+        failures: logs that could not be read or judged, sorted by site and name.
         logs: by key, those counted: where each lies and its report's folder (None without one).
+        troubles_s: by key, seconds from a log's start until its first interval in which the robot
+            was lost or the map changed; logs without one are not in it.
         alike: how many of a robot's logs are worth one independent log, on average: 1 where logs of
             a robot are no more alike than others.
         remarks: one line each on what was left out, damaged parts among it.
@@ -385,6 +401,8 @@ class Answers:
     steps: tuple[Step, ...]
     maps: tuple[MapPlaces, ...]
     copies: tuple[Copies, ...]
+    failures: tuple[Failure, ...]
     logs: Mapping[str, tuple[str, str | None]]
+    troubles_s: Mapping[str, float]
     alike: float
     remarks: tuple[str, ...]

@@ -2,21 +2,16 @@
 
 from __future__ import annotations
 
-import base64
-import hashlib
 from dataclasses import dataclass
-from importlib.resources import files
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 from matplotlib.figure import Figure
 
-from slamreplay.evidence.clean import clean, straight
 from slamreplay.evidence.result import Postmortem
 from slamreplay.report.figures import canvas
 from slamreplay.report.figures.panels import PANELS
+from slamreplay.report.one_file import render, texts
 from slamreplay.report.page import Page, page
-from slamreplay.report.phrases import bound
 from slamreplay.report.print_style import print_style
 from slamreplay.report.replay.replay import replay_of
 from slamreplay.report.sections import sections
@@ -43,48 +38,13 @@ def html(post: Postmortem) -> str:
     """The whole page. Whatever came from the log is escaped by the template engine."""
     view = page(post)
     replay = replay_of(post)
-    styles = [*_texts(_STYLES), print_style(view.title)]
-    scripts = [] if replay is None else ["\n".join(_texts(_SCRIPTS))]
-    environment = Environment(
-        loader=PackageLoader("slamreplay.report", "templates"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    environment.filters["bound"] = bound
     pictures = _pictures(post, view)
-    text = environment.get_template("report.html.j2").render(
-        page=view,
-        replay=replay,
-        sections=sections(view, pictures),
-        policy=_policy(styles, scripts),
-        styles=styles,
-        scripts=scripts,
-        **pictures,
+    return render(
+        "report.html.j2",
+        {"page": view, "replay": replay, "sections": sections(view, pictures), **pictures},
+        styles=[*texts(_STYLES), print_style(view.title)],
+        scripts=[] if replay is None else ["\n".join(texts(_SCRIPTS))],
     )
-    return straight(clean(text))
-
-
-def _texts(names: tuple[str, ...]) -> list[str]:
-    folder = files("slamreplay.report").joinpath("templates")
-    return [folder.joinpath(name).read_text("utf-8") for name in names]
-
-
-def _policy(styles: list[str], scripts: list[str]) -> str:
-    """Hashes, not 'unsafe-inline': the page's own styles and scripts are all that is applied."""
-    return "; ".join([
-        "default-src 'none'",
-        "img-src data:",
-        " ".join(["style-src", *map(_hash, styles)]),
-        *([" ".join(["script-src", *map(_hash, scripts)])] if scripts else []),
-        "base-uri 'none'",
-        "form-action 'none'",
-    ])  # fmt: skip
-
-
-def _hash(text: str) -> str:
-    return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"
 
 
 def _pictures(post: Postmortem, view: Page) -> dict[str, Picture | None]:

@@ -11,12 +11,12 @@ _MOST = 80
 _PLAIN = re.compile(r"[^A-Za-z0-9_.+ -]")
 
 
-def print_style(title: str) -> str:
-    """A style sheet of its own, for the name is the log's."""
+def print_style(title: str, kind: str = "slamreplay post-mortem") -> str:
+    """A style sheet of its own, for the name is the log's; `kind` of page stands at the left."""
     shown = title if len(title) <= _MOST else f"{title[: _MOST - 3]}..."
     return (
         "@page{"
-        '@top-left{content:"slamreplay post-mortem";font:8pt sans-serif;color:#555b61}'
+        f'@top-left{{content:"{kind}";font:8pt sans-serif;color:#555b61}}'
         f'@top-right{{content:"{_escaped(clean(shown))}";font:8pt sans-serif;color:#555b61}}'
         '@bottom-right{content:counter(page) " of " counter(pages);'
         "font:8pt sans-serif;color:#555b61}}"

@@ -1,0 +1,146 @@
+"""How is my fleet: one sentence, three numbers, and how alarming they are."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from slamreplay.fleet.answers import Answers, Area, Step
+from slamreplay.fleet.page import words
+from slamreplay.fleet.page.remap import needed
+from slamreplay.report.phrases import short
+from slamreplay.verdict.words import square_metres
+
+
+@dataclass(frozen=True)
+class Fact:
+    """One number, what it is, what to hold it against, and the section that tells more.
+
+    Where there is no number a word stands in its place, and needs no label.
+    """
+
+    number: str
+    label: str
+    detail: str
+    link: str
+    more: str
+    alarming: bool = False
+
+
+def sentence(answers: Answers) -> str:
+    """The fleet in one sentence."""
+    total = answers.total
+    if not total.logs:
+        return "There is no log to tell of yet."
+    days = sum(group.name is not None for group in answers.by["day"])
+    start = f"f {words.count(total.logs, 'log')} of {words.count(total.robots, 'robot')}"
+    start += f" in {words.count(days, 'day')}" if days else ""
+    lost = total.lost.count
+    how = "was" if lost == 1 else "were"
+    begin = f"O{start} {lost:,} {how} lost" if lost else f"None o{start} was lost"
+    return f"{begin}{_of_maps(needed(answers.areas), lost)}."
+
+
+def tone(answers: Answers) -> str:
+    """The state whose colour the page has."""
+    if answers.total.lost.count:
+        return "lost"
+    if needed(answers.areas):
+        return "map_changed"
+    return "healthy" if answers.total.logs > answers.total.failed else "insufficient_data"
+
+
+def facts(answers: Answers) -> tuple[Fact, Fact, Fact]:
+    """Which aisles need re-mapping, how often robots get lost, and whether software got worse."""
+    return _areas(answers.areas), _rate(answers), _software(answers.steps)
+
+
+def _of_maps(areas: Sequence[Area], lost: int) -> str:
+    if not areas:
+        return "; no map has to be made again" if lost else ", and no map has to be made again"
+    beside = max(areas, key=lambda area: area.lost_near)
+    if not beside.lost_near:
+        places = "place has" if len(areas) == 1 else "places have"
+        return f"; {len(areas):,} {places} to be mapped again, the first at {_site(areas[0])}"
+    all_of_them = beside.lost_near >= lost
+    told = "all of them" if all_of_them and lost > 1 else f"{beside.lost_near:,} of them"
+    told = "it" if all_of_them and lost == 1 else told
+    return f"; {told} in one aisle of {_site(beside)} whose map has aged"
+
+
+def _site(area: Area) -> str:
+    return "a site not told" if area.site is None else f"site {area.site}"
+
+
+def _areas(areas: Sequence[Area]) -> Fact:
+    found = needed(areas)
+    if not found:
+        watched = sum(area.advice == "watch" for area in areas)
+        detail = "No part of a map stays contradicted by logs."
+        if watched:
+            detail = f"{words.count(watched, 'place')} may become one: nothing more is known yet."
+        return Fact("none", "", f"Aisles that need re-mapping. {detail}", "#remap", "See them")
+    first = found[0]
+    detail = (
+        f"First {_site(first)}, {words.place(first.box_m)}: {square_metres(first.m2)}, since "
+        f"{words.day(first.first_day)}, seen by {words.count(first.logs, 'log')} of "
+        f"{words.count(first.robots, 'robot')}."
+    )
+    name = "aisle needs re-mapping" if len(found) == 1 else "aisles need re-mapping"
+    return Fact(f"{len(found):,}", name, detail, "#remap", "See which", alarming=True)
+
+
+def _rate(answers: Answers) -> Fact:
+    total, rate = answers.total, answers.total.lost_per_km
+    within = words.interval_of(rate)
+    detail = f"{within} with 95 % confidence. " if within else ""
+    detail += (
+        f"{words.hours(total.lost_h)} lost of {words.hours(total.judged_h)}; "
+        f"{words.count(total.stops, 'unplanned stop')}."
+    )
+    if rate.value is None:
+        return Fact("unknown", "", f"How often robots get lost per km. {detail}", "#robots", "See whose")
+    return Fact(
+        f"{short(rate.value)} per km",
+        "robots became lost so often",
+        detail[:1].upper() + detail[1:],
+        "#robots",
+        "See whose",
+        alarming=rate.events > 0,
+    )
+
+
+def _software(steps: Sequence[Step]) -> Fact:
+    worse = [step for step in steps if step.verdict == "worse"]
+    if not steps:
+        return Fact("one", "", "Software version or none: nothing to compare.", "#software", "See it")
+    if not worse:
+        pairs = len({(step.before, step.after) for step in steps})
+        detail = f"Software versions that got worse, of {words.count(pairs, 'change')} of version."
+        return Fact("none", "", detail, "#software", "See the numbers")
+    step = next((one for one in worse if one.measure == "lost"), worse[0])
+    return Fact(
+        f"{words.share_of(step.was)} to {words.share_of(step.now)}",
+        f"of logs {measure_words(step.measure)} since {step.after}",
+        f"Was so with {step.before}; {difference(step)}, over {words.count(step.sites, 'site')} "
+        f"and {words.count(step.robots, 'robot')}.",
+        "#software",
+        "See the numbers",
+        alarming=True,
+    )
+
+
+def difference(step: Step) -> str:
+    """How far apart two versions are, in points."""
+    if step.low is None or step.high is None:
+        return "the difference is not known"
+    return f"{100.0 * step.low:+.0f} to {100.0 * step.high:+.0f} points with 95 % confidence"
+
+
+def measure_words(measure: str) -> str:
+    """What a step's measure counts, as in "of logs ..."."""
+    from slamreplay.evidence.words import FAILURE_MODES
+
+    told = {"lost": "lost", "changed": "with a changed map", "stopped": "with an unplanned stop",
+            "gate": "that the gate failed"}  # fmt: skip
+    return told.get(measure, f"with {FAILURE_MODES.get(measure, measure.replace('_', ' '))}")

@@ -1,0 +1,159 @@
+"""Which aisles need re-mapping: the parts of maps that logs contradict, the most urgent first."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from slamreplay.fleet.answers import Area, MapPlaces
+from slamreplay.fleet.page import words
+from slamreplay.fleet.page.frame import Frame, around, frame_of, nice
+from slamreplay.fleet.page.heat import Shade, blocks_of, heat
+from slamreplay.fleet.page.links import Link, Reports
+from slamreplay.fleet.page.map_image import MapImage
+from slamreplay.report.cells import Cell, Table, table
+from slamreplay.verdict.words import square_metres
+
+#: So many are shown with a piece of their map.
+MOST_CARDS = 10
+_ASPECT, _MARGIN_M, _LEAST_M = 4.0 / 3.0, 3.0, 12.0
+_LEVELS = (0.1, 0.25, 0.5, 0.75)
+
+
+@dataclass(frozen=True)
+class Card:
+    """An area with a piece of its map.
+
+    Attributes:
+        title: where it is.
+        m2: how large.
+        since: the day when it was first seen.
+        short: who saw it, and what it costs.
+        facts: name and value.
+        why: the reason in a sentence.
+        log: the latest one that says so.
+        frame: of the piece.
+        image: id of the map's image on the page, empty where the map is not there.
+        box: x, y, width and height of the area, m.
+        shades: what share of logs contradicts each place of it.
+        bar: x and width of a scale bar in units of the drawing, and its length in words.
+        alt: the picture in words.
+    """
+
+    title: str
+    m2: str
+    since: str
+    short: str
+    facts: tuple[tuple[str, str], ...]
+    why: str
+    log: Link
+    frame: Frame
+    image: str
+    box: tuple[float, float, float, float]
+    shades: tuple[Shade, ...]
+    bar: tuple[float, float, str]
+    alt: str
+
+
+def needed(areas: Sequence[Area]) -> tuple[Area, ...]:
+    """Those to be mapped again, the most urgent first."""
+    return tuple(area for area in areas if area.advice == "re-map")
+
+
+def cards(
+    areas: Sequence[Area],
+    maps: Sequence[MapPlaces],
+    images: Mapping[str, tuple[str, MapImage]],
+    reports: Reports,
+) -> tuple[Card, ...]:
+    """The first of them, each with a piece of its map."""
+    by_map = {(one.site, one.map_version): one for one in maps}
+    return tuple(
+        _card(area, by_map.get((area.site, area.map_version)), images.get(area.map_version), reports)
+        for area in areas[:MOST_CARDS]
+    )
+
+
+def rest(areas: Sequence[Area], reports: Reports) -> Table:
+    """Areas as rows: those that had no room, that may still settle, or that did."""
+    head = ("advice", "site", "where", "area", "since", "logs, robots", "later looks", "lost nearby",
+            "latest log")  # fmt: skip
+    rows = [
+        (
+            area.advice,
+            words.label(area.site),
+            Cell(words.place(area.box_m), f"map {words.map_name(area.map_version)}"),
+            square_metres(area.m2),
+            words.day(area.first_day),
+            f"{area.logs:,} of {words.count(area.robots, 'robot')}",
+            _still(area),
+            words.hours(area.lost_near_s / 3600.0),
+            _cell(reports.of(area.example)),
+        )
+        for area in areas
+    ]
+    return table(head, rows, "the query's answer")
+
+
+def _cell(link: Link) -> Cell:
+    return Cell(link.text, links=((link.text, link.href),) if link.href else ())
+
+
+def _card(
+    area: Area, places: MapPlaces | None, image: tuple[str, MapImage] | None, reports: Reports
+) -> Card:
+    frame = frame_of(
+        around(area.box_m, margin_m=_MARGIN_M, aspect=_ASPECT, least_m=_LEAST_M), axes=False
+    )
+    x0, y0, x1, y1 = area.box_m
+    length = nice(frame.clip[2] / frame.metre / 8.0)
+    title = f"{words.label(area.site)}, {words.place(area.box_m)}"
+    facts = (
+        ("since", f"{words.day(area.first_day)}, last seen {words.day(area.last_day)}"),
+        ("seen by", f"{words.count(area.logs, 'log')} of {words.count(area.robots, 'robot')}"),
+        ("still so", _still(area)),
+        ("it costs", f"{words.hours(area.lost_near_s / 3600.0)} lost nearby, of "
+                     f"{words.hours(area.near_h)} that robots were there"),
+        ("map", words.map_name(area.map_version)),
+    )  # fmt: skip
+    return Card(
+        title,
+        square_metres(area.m2),
+        words.day(area.first_day),
+        f"{words.count(area.logs, 'log')} of {words.count(area.robots, 'robot')}, {_still(area)}; "
+        f"{words.hours(area.lost_near_s / 3600.0)} lost nearby",
+        facts,
+        area.why,
+        reports.of(area.example),
+        frame,
+        "" if image is None else image[0],
+        (x0, y0, x1 - x0, y1 - y0),
+        _shades(places),
+        (12.0, round(length * frame.metre, 2), f"{length:g} m"),
+        f"Piece of the map of {words.label(area.site)} with the area that has aged: {title}.",
+    )
+
+
+def _shades(places: MapPlaces | None) -> tuple[Shade, ...]:
+    if places is None or not len(places.col):
+        return ()
+    blocks = blocks_of(places.col, places.row)
+    looks, against = blocks.greatest(places.looks), blocks.greatest(places.against)
+    share = np.divide(against, looks, out=np.zeros_like(looks), where=looks > 0)
+    classes = [""] * (len(_LEVELS) + 1)
+    return heat(
+        blocks, share, bounds=_LEVELS, classes=classes, texts=[""] * len(share)
+    ).shades
+
+
+def _still(area: Area) -> str:
+    if not area.visits:
+        return "nobody came back yet"
+    looks = f"{area.still:,} of {words.count(area.visits, 'later look')}"
+    if area.latest > 1:
+        return f"{looks}, the latest {area.latest:,} in a row"
+    if area.latest == 1:
+        return f"{looks}, the latest one too"
+    return f"{looks}, not the latest {words.count(-area.latest, 'one')}"
