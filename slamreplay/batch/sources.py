@@ -17,6 +17,10 @@ from slamreplay.errors import LogError, SlamreplayError, UsageError
 Tell = Callable[[str], None]
 
 
+class NoLogError(LogError):
+    """There is no log at all, or none yet."""
+
+
 def _silent(_remark: str) -> None:
     pass
 
@@ -37,7 +41,7 @@ def sources_of(
         tell: told in a sentence what was skipped, with a count.
 
     Raises:
-        LogError: a place cannot be read, or there is no log at all.
+        LogError: a place cannot be read; `NoLogError` where there is no log at all.
         UsageError: a place that makes no sense.
     """
     found: dict[str, LogSource] = {}
@@ -45,7 +49,7 @@ def sources_of(
         for source in _of_place(place, tell):
             found.setdefault(_identity(source), source)
     if not found:
-        raise LogError(
+        raise NoLogError(
             "no log there", where=", ".join(shown(p) for p in places[:3]) or None,
             hint="a .bag, .mcap, .db3 or .clf, a folder of rosbag2 or MRCLAM, or a bundle",
         )  # fmt: skip
