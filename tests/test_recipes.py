@@ -19,7 +19,8 @@ from slamreplay.labs import LABS
 from slamreplay.recipes import DoseRecipe, read_recipe
 
 ROOT = Path(__file__).resolve().parents[1]
-RECIPES = sorted(path for path in (ROOT / "recipes").iterdir() if path.is_dir())
+#: A folder without a recipe holds what people copy: scripts and manifests.
+RECIPES = sorted(path.parent for path in (ROOT / "recipes").glob("*/recipe.yaml"))
 BREATHING = ROOT / "recipes" / "covariance-breathing" / "recipe.yaml"
 PROGRAM = str(Path(sys.executable).with_name("slamreplay"))
 

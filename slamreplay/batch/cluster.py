@@ -7,8 +7,8 @@ import pkgutil
 import platform
 import signal
 import sys
-from collections.abc import Iterator, Mapping
-from contextlib import ExitStack, contextmanager, suppress
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import AbstractContextManager, ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from multiprocessing import resource_tracker
 from pathlib import Path
@@ -79,6 +79,11 @@ class Workers:
         return self
 
 
+#: Gives a client of the workers for the time of a block, and a scratch folder for those of this
+#: machine.
+Connect = Callable[[Workers, Path], AbstractContextManager["Client"]]
+
+
 @contextmanager
 def connected(workers: Workers, scratch: Path) -> Iterator[Client]:
     """A client of the workers; those of this machine live as long as the block.
@@ -105,6 +110,28 @@ def connected(workers: Workers, scratch: Path) -> Iterator[Client]:
         yield client
 
 
+@contextmanager
+def kept_connected() -> Iterator[Connect]:
+    """A way to connect whose workers stay from one block to the next, while this block lasts.
+
+    They are started by the first block that needs them; a client that lost its scheduler is
+    replaced.
+    """
+    with ExitStack() as stack:
+        held: list[Client] = []
+
+        @contextmanager
+        def connect(workers: Workers, scratch: Path) -> Iterator[Client]:
+            if held and held[0].status != "running":
+                held.clear()
+                stack.close()
+            if not held:
+                held.append(stack.enter_context(connected(workers, scratch)))
+            yield held[0]
+
+        yield connect
+
+
 def _local(workers: Workers, scratch: Path) -> LocalCluster:
     import dask
     from distributed import LocalCluster
@@ -116,6 +143,8 @@ def _local(workers: Workers, scratch: Path) -> LocalCluster:
             threads_per_worker=1,
             processes=True,
             dashboard_address=None,
+            # Its scheduler listens all the same, and two batches on one machine want one port.
+            scheduler_kwargs={"dashboard_address": "localhost:0"},
             silence_logs=logging.CRITICAL + 1,
             local_directory=str(scratch),
             env={"NUMBA_NUM_THREADS": "1"},

@@ -10,7 +10,7 @@ from pathlib import Path
 from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING
 
-from slamreplay.batch.cluster import ClusterError, Workers, connected
+from slamreplay.batch.cluster import ClusterError, Connect, Workers, connected
 from slamreplay.batch.task import LogResult, LogTask
 from slamreplay.batch.work import Work
 from slamreplay.batch.worker import failed, line_of, look_back
@@ -31,7 +31,9 @@ class _LostError(Exception):
     """The scheduler went away."""
 
 
-def looked_back(tasks: Sequence[LogTask], workers: Workers, scratch: Path) -> Generator[LogResult]:
+def looked_back(
+    tasks: Sequence[LogTask], workers: Workers, scratch: Path, connect: Connect = connected
+) -> Generator[LogResult]:
     """The result of every task, once each, in the order they are done.
 
     A worker that dies may have died of the log it worked on, or of another's. All logs that it had
@@ -42,6 +44,7 @@ def looked_back(tasks: Sequence[LogTask], workers: Workers, scratch: Path) -> Ge
         tasks: what to do; few of them are out at any time, so nothing piles up anywhere.
         workers: who does it.
         scratch: folder for what workers of this machine write.
+        connect: reaches them; by default workers of this machine end with the tasks.
 
     Raises:
         ClusterError: the cluster cannot be used, or went away for good.
@@ -50,7 +53,7 @@ def looked_back(tasks: Sequence[LogTask], workers: Workers, scratch: Path) -> Ge
     lost: float | None = None
     while work.left:
         try:
-            with connected(workers, scratch) as client:
+            with connect(workers, scratch) as client:
                 for result in served(client, work, workers):
                     lost = None
                     yield result

@@ -21,6 +21,10 @@ _HINT = "a .bag, .mcap, .db3 or .clf, a folder of rosbag2 or MRCLAM, or a bundle
 Tell = Callable[[str], None]
 
 
+class NoLogError(LogError):
+    """There is no log at all, or none yet."""
+
+
 def sources_of(
     places: Sequence[str],
     maps: MapsTable | None = None,
@@ -43,7 +47,7 @@ def sources_of(
         tell: told in one sentence each what was skipped or of no use, with a count.
 
     Raises:
-        LogError: a place does not exist or cannot be read, or there is no log at all.
+        LogError: a place does not exist or cannot be read, `NoLogError` where there is no log at all.
         UsageError: a place or a manifest that makes no sense.
     """
     found: dict[str, LogSource] = {}
@@ -54,7 +58,7 @@ def sources_of(
         for source in logs:
             found.setdefault(_identity(source), source)
     if not found:
-        raise LogError("no log there", where=", ".join(shown(p) for p in places[:3]) or None,
+        raise NoLogError("no log there", where=", ".join(shown(p) for p in places[:3]) or None,
                        hint=_HINT)  # fmt: skip
     sources = sorted(found.values(), key=lambda source: (source.log, source.files[0].url))
     if maps is not None:

@@ -23,7 +23,6 @@ from slamreplay.maps.grid import OccupancyGrid
 from slamreplay.simulate import truth
 from slamreplay.simulate.recording import Recording
 from slamreplay.simulate.sensors import XYYAW_BASE_LASER, XYYAW_BASE_REAR, Lidar, Scans
-from slamreplay.simulate.topics import START_NS
 from slamreplay.simulate.worlds import Solid, World, rasterise
 
 #: What beams met for a shorter time in all does not count as standing.
@@ -96,15 +95,16 @@ def truth_of(incident: Incident, bundle: Bundle) -> Truth:
     """
     r = incident.recording
     story = r.scenario
-    t_ns = START_NS + np.array([round(float(t + story.scan_late_s) * 1e9) for t in r.scans.t_s])
+    start_ns = story.start_ns
+    t_ns = start_ns + np.array([round(float(t + story.scan_late_s) * 1e9) for t in r.scans.t_s])
     last_s = float(r.motion.t_s[-1])
-    own = r.motion.poses_at(np.minimum((t_ns - START_NS) / 1e9, last_s))
+    own = r.motion.poses_at(np.minimum((t_ns - start_ns) / 1e9, last_s))
     offset = np.array(story.xyyaw_logged_map)
     belief = recorded_belief(bundle.view(), t_ns)
     believed = np.full((len(t_ns), 3), np.nan) if belief is None else belief.xyyaw
     with np.errstate(invalid="ignore"):
         far = truth.is_far(believed, own)
-    share, regions = _changes(r, offset)
+    share, regions = changes_of(r, offset)
     t_s = (t_ns - t_ns[0]) / 1e9
     lost = truth.in_stretches(t_s, far, truth.LOST_FOR_S, truth.GAP_S)
     beyond = share > truth.CHANGED_SHARE
@@ -127,7 +127,7 @@ def truth_of(incident: Incident, bundle: Bundle) -> Truth:
     )
 
 
-def _changes(r: Recording, offset: se2.Array) -> tuple[se2.Array, tuple[TrueRegion, ...]]:
+def changes_of(r: Recording, offset: se2.Array) -> tuple[se2.Array, tuple[TrueRegion, ...]]:
     """Changed share of each scan of the first laser, beams of a second one pooled with it."""
     added, gone = changed_solids(r.scenario.mapped, r.scenario.standing)
     n = len(r.scans.t_s)

@@ -24,7 +24,7 @@ EXIT_INPUT, EXIT_FAULT, EXIT_INTERRUPTED = 2, 70, 130
 
 #: Command modules, in the order of the help; each has `register(app)` and imports nothing heavy.
 COMMANDS = (
-    "report", "ingest", "inspect", "perturb", "gate", "batch", "export", "simulate", "bench",
+    "report", "gate", "batch", "watch", "ingest", "inspect", "perturb", "export", "simulate", "bench",
     "explain", "list_",
 )  # fmt: skip
 

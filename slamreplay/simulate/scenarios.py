@@ -9,6 +9,7 @@ import numpy as np
 from slamreplay.errors import UsageError
 from slamreplay.estimators.amcl.config import AmclConfig
 from slamreplay.geometry import se2
+from slamreplay.geometry.times import NS_PER_S
 from slamreplay.simulate import SCENARIOS
 from slamreplay.simulate.codes import CodeFloor
 from slamreplay.simulate.drive import BackUp, Carry, Follow, Pause, Slip, Spin, Step
@@ -23,6 +24,9 @@ from slamreplay.simulate.worlds import (
     office,
     warehouse,
 )
+
+#: Stamps start here: a fixed time, for a log must not depend on when it was made.
+START_NS = 1_750_000_000 * NS_PER_S
 
 
 @dataclass(frozen=True)
@@ -55,6 +59,7 @@ class Scenario:
         xyyaw_logged_map: (3) the robot's map frame in the frame of the map in the log.
         true_odometry_s: stretches (from, to) in s in which odometry tells the motion as it was,
             whatever the wheels did: what a slip or a carry would have been without its fault.
+        start_ns: the robot's clock when the log begins.
     """
 
     mapped: World
@@ -80,6 +85,7 @@ class Scenario:
     xyyaw_logged_map: tuple[float, float, float] = (0.0, 0.0, 0.0)
     start_sigmas: tuple[float, float, float] | None = None
     true_odometry_s: tuple[tuple[float, float], ...] = ()
+    start_ns: int = START_NS
 
     @property
     def start_cov(self) -> se2.Array:

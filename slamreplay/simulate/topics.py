@@ -17,10 +17,9 @@ from slamreplay.simulate.drive import RATE_HZ, Follow, Phase
 from slamreplay.simulate.localizer import odometry_at
 from slamreplay.simulate.messages import Messages
 from slamreplay.simulate.recording import Recording
+from slamreplay.simulate.scenarios import START_NS as START_NS  # where others look for it
 from slamreplay.simulate.sensors import XYYAW_BASE_LASER, XYYAW_BASE_REAR, Lidar, Scans
 
-#: Stamps start here: a fixed time, for a log must not depend on when it was made.
-START_NS = 1_750_000_000 * NS_PER_S
 #: nav2_amcl dates map->odom ahead, so that it can be used until the next one comes.
 TRANSFORM_TOLERANCE_NS = NS_PER_S
 LASER_HEIGHT_M = 0.22
@@ -56,21 +55,21 @@ def records(recording: Recording, messages: Messages) -> list[Record]:
     return sorted(late, key=lambda r: r.t_log_ns)
 
 
-def _ns(t_s: float) -> int:
+def _ns(r: Recording, t_s: float) -> int:
     """A time since the start as a stamp."""
-    return START_NS + round(float(t_s) * NS_PER_S)
+    return r.scenario.start_ns + round(float(t_s) * NS_PER_S)
 
 
 def _start(r: Recording, m: Messages) -> Iterator[Record]:
     for laser in _lasers(r):
-        mount = m.transform(_ns(0), ("base_link", laser.frame), laser.mount, LASER_HEIGHT_M)
-        yield Record(_ns(0.005), "/tf_static", "tf2_msgs/TFMessage", mount)
+        mount = m.transform(_ns(r, 0), ("base_link", laser.frame), laser.mount, LASER_HEIGHT_M)
+        yield Record(_ns(r, 0.005), "/tf_static", "tf2_msgs/TFMessage", mount)
     known = r.logged_map
-    grid = m.grid(_ns(0), "map", known.cells, known.resolution_m, known.origin_xyyaw)
-    yield Record(_ns(0.005), "/map", "nav_msgs/OccupancyGrid", grid)
-    clicked = m.pose_stamped_with_covariance(_ns(0.02), r.start, r.scenario.start_cov)
+    grid = m.grid(_ns(r, 0), "map", known.cells, known.resolution_m, known.origin_xyyaw)
+    yield Record(_ns(r, 0.005), "/map", "nav_msgs/OccupancyGrid", grid)
+    clicked = m.pose_stamped_with_covariance(_ns(r, 0.02), r.start, r.scenario.start_cov)
     yield Record(
-        _ns(0.02 + _REST_LATE),
+        _ns(r, 0.02 + _REST_LATE),
         "/initialpose",
         "geometry_msgs/PoseWithCovarianceStamped",
         clicked,
@@ -85,7 +84,7 @@ def _wheels(r: Recording, m: Messages) -> Iterator[Record]:
     if "odometry" in r.scenario.without:
         return
     for t_s, xyyaw, cov, twist in zip(o.t_s, o.xyyaw, o.cov, o.twist, strict=True):
-        stamp, arrival = _ns(t_s + late_s), _ns(t_s + _ODOMETRY_LATE)
+        stamp, arrival = _ns(r, t_s + late_s), _ns(r, t_s + _ODOMETRY_LATE)
         message = m.odometry(stamp, frames, xyyaw, cov, twist, twist_cov)
         yield Record(arrival, "/odom", "nav_msgs/Odometry", message)
         if "tf" not in r.scenario.without:
@@ -100,7 +99,7 @@ def _inertial(r: Recording, m: Messages) -> Iterator[Record]:
     for t_s, gyro, force in zip(r.motion.t_s, r.gyro, r.force, strict=True):
         message = m.make(
             "sensor_msgs/Imu",
-            header=m.header(_ns(t_s), "base_link"),
+            header=m.header(_ns(r, t_s), "base_link"),
             orientation=nowhere,
             orientation_covariance=unknown,
             angular_velocity=m.vector(*gyro),
@@ -108,7 +107,7 @@ def _inertial(r: Recording, m: Messages) -> Iterator[Record]:
             linear_acceleration=m.vector(*force),
             linear_acceleration_covariance=force_cov,
         )
-        yield Record(_ns(t_s + _IMU_LATE), "/imu", "sensor_msgs/Imu", message)
+        yield Record(_ns(r, t_s + _IMU_LATE), "/imu", "sensor_msgs/Imu", message)
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,9 +142,9 @@ def _lidar(r: Recording, m: Messages) -> Iterator[Record]:
     has_odometry = "odometry" not in r.scenario.without
     bases = odometry_at(r.odometry, _stamps(r) - r.scenario.odometry_late_s)
     for i, t_s in enumerate(front.scans.t_s):
-        stamp, arrival_s = _ns(t_s + r.scenario.scan_late_s), t_s + _arrival_s(front)
+        stamp, arrival_s = _ns(r, t_s + r.scenario.scan_late_s), t_s + _arrival_s(front)
         yield _scan(r, m, front, i)
-        answer = _ns(arrival_s + _AMCL_LATE)
+        answer = _ns(r, arrival_s + _AMCL_LATE)
         if b.updated[i] or not has_odometry:
             # Nothing carries a pose on where there is no odometry: such localizers send them all.
             mean = b.mean[i] if has_odometry else se2.compose(b.map_odom[i], bases[i])
@@ -174,7 +173,7 @@ def _scan(r: Recording, m: Messages, laser: _Laser, i: int) -> Record:
     bearings = lidar.bearings
     message = m.make(
         "sensor_msgs/LaserScan",
-        header=m.header(_ns(t_s + r.scenario.scan_late_s), laser.frame),
+        header=m.header(_ns(r, t_s + r.scenario.scan_late_s), laser.frame),
         angle_min=float(bearings[0]),
         angle_max=float(bearings[-1]),
         angle_increment=float(bearings[1] - bearings[0]),
@@ -185,7 +184,7 @@ def _scan(r: Recording, m: Messages, laser: _Laser, i: int) -> Record:
         ranges=laser.scans.ranges[i],
         intensities=np.empty(0, dtype=np.float32),
     )
-    return Record(_ns(t_s + _arrival_s(laser)), laser.topic, "sensor_msgs/LaserScan", message)
+    return Record(_ns(r, t_s + _arrival_s(laser)), laser.topic, "sensor_msgs/LaserScan", message)
 
 
 def _codes(r: Recording, m: Messages) -> Iterator[Record]:
@@ -193,13 +192,13 @@ def _codes(r: Recording, m: Messages) -> Iterator[Record]:
     floor, readings = r.scenario.floor, r.readings
     if floor is None or readings is None:
         return
-    mount = m.spatial_transforms(_ns(0), "base_link", [_CAMERA], camera_mount()[None])
-    yield Record(_ns(0.005), "/tf_static", "tf2_msgs/TFMessage", mount)
+    mount = m.spatial_transforms(_ns(r, 0), "base_link", [_CAMERA], camera_mount()[None])
+    yield Record(_ns(r, 0.005), "/tf_static", "tf2_msgs/TFMessage", mount)
     names = [f"tag_{number}" for number in range(len(floor.places))]
-    survey = m.spatial_transforms(_ns(0), "map", names, se3.from_planar(floor.places))
-    yield Record(_ns(0.006), "/tf_static", "tf2_msgs/TFMessage", survey)
+    survey = m.spatial_transforms(_ns(r, 0), "map", names, se3.from_planar(floor.places))
+    yield Record(_ns(r, 0.006), "/tf_static", "tf2_msgs/TFMessage", survey)
     for t_s, number, T in zip(readings.t_s, readings.number, readings.T_camera_code, strict=True):
-        stamp = _ns(t_s)
+        stamp = _ns(r, t_s)
         found = m.code(stamp, _CAMERA, int(number), floor.size_m, T)
         array = m.make(
             "apriltag_ros/AprilTagDetectionArray",
@@ -207,33 +206,33 @@ def _codes(r: Recording, m: Messages) -> Iterator[Record]:
             detections=[found],
         )
         msgtype = "apriltag_ros/AprilTagDetectionArray"
-        yield Record(_ns(t_s + _CODE_LATE), "/tag_detections", msgtype, array)
+        yield Record(_ns(r, t_s + _CODE_LATE), "/tag_detections", msgtype, array)
 
 
 def _navigator(r: Recording, m: Messages) -> Iterator[Record]:
     for first in range(0, len(r.motion.t_s), RATE_HZ // 10):
         v, w = r.motion.wheels[first]
         t_s = max(r.motion.t_s[first] - 0.02, 0.0)  # the wheels follow a moment later
-        yield Record(_ns(t_s), "/cmd_vel", "geometry_msgs/Twist", m.twist(float(v), float(w)))
+        yield Record(_ns(r, t_s), "/cmd_vel", "geometry_msgs/Twist", m.twist(float(v), float(w)))
     for phase in r.motion.phases:
         if isinstance(phase.step, Follow):
             t_s = phase.first / RATE_HZ
-            plan = m.path(_ns(t_s), _believed_plan(r, phase))
-            yield Record(_ns(t_s + 0.06 + _REST_LATE), "/plan", "nav_msgs/Path", plan)
+            plan = m.path(_ns(r, t_s), _believed_plan(r, phase))
+            yield Record(_ns(r, t_s + 0.06 + _REST_LATE), "/plan", "nav_msgs/Path", plan)
     for change in status_changes(r.motion):
         status = m.make(
             "nav2_msgs/BehaviorTreeStatusChange",
-            timestamp=m.stamp(_ns(change.t_s)),
+            timestamp=m.stamp(_ns(r, change.t_s)),
             node_name=change.node,
             uid=change.uid,
             previous_status=change.before,
             current_status=change.after,
         )
         log = m.make(
-            "nav2_msgs/BehaviorTreeLog", timestamp=m.stamp(_ns(change.t_s)), event_log=[status]
+            "nav2_msgs/BehaviorTreeLog", timestamp=m.stamp(_ns(r, change.t_s)), event_log=[status]
         )
         yield Record(
-            _ns(change.t_s + _REST_LATE), "/behavior_tree_log", "nav2_msgs/BehaviorTreeLog", log
+            _ns(r, change.t_s + _REST_LATE), "/behavior_tree_log", "nav2_msgs/BehaviorTreeLog", log
         )
 
 
@@ -266,9 +265,9 @@ def _costmaps(r: Recording, m: Messages) -> Iterator[Record]:
         costs, origin = local_costmap(base[i], r.scenario.lidar.bearings, ranges)
         pose = np.array([*origin, 0.0])
         t_s = r.scans.t_s[i] + 0.1
-        message = m.grid(_ns(t_s), "odom", costs, RESOLUTION_M, pose)
+        message = m.grid(_ns(r, t_s), "odom", costs, RESOLUTION_M, pose)
         topic = "/local_costmap/costmap"
-        yield Record(_ns(t_s + _REST_LATE), topic, "nav_msgs/OccupancyGrid", message)
+        yield Record(_ns(r, t_s + _REST_LATE), topic, "nav_msgs/OccupancyGrid", message)
 
 
 def _reference(r: Recording, m: Messages) -> Iterator[Record]:
@@ -277,5 +276,5 @@ def _reference(r: Recording, m: Messages) -> Iterator[Record]:
     poses = r.motion.poses_at(t_s)
     twists = r.motion.twist[np.rint(t_s * RATE_HZ).astype(np.int64)]
     for t, xyyaw, twist in zip(t_s, poses, twists, strict=True):
-        message = m.odometry(_ns(t), frames, xyyaw, none, twist, none)
-        yield Record(_ns(t + _IMU_LATE), "/slamreplay/reference", "nav_msgs/Odometry", message)
+        message = m.odometry(_ns(r, t), frames, xyyaw, none, twist, none)
+        yield Record(_ns(r, t + _IMU_LATE), "/slamreplay/reference", "nav_msgs/Odometry", message)

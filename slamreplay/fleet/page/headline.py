@@ -99,7 +99,9 @@ def _rate(answers: Answers) -> Fact:
         f"{words.count(total.stops, 'unplanned stop')}."
     )
     if rate.value is None:
-        return Fact("unknown", "", f"How often robots get lost per km. {detail}", "#robots", "See whose")
+        return Fact(
+            "unknown", "", f"How often robots get lost per km. {detail}", "#robots", "See whose"
+        )
     return Fact(
         f"{short(rate.value)} per km",
         "robots became lost so often",
@@ -113,7 +115,9 @@ def _rate(answers: Answers) -> Fact:
 def _software(steps: Sequence[Step]) -> Fact:
     worse = [step for step in steps if step.verdict == "worse"]
     if not steps:
-        return Fact("one", "", "Software version or none: nothing to compare.", "#software", "See it")
+        return Fact(
+            "one", "", "Software version or none: nothing to compare.", "#software", "See it"
+        )
     if not worse:
         pairs = len({(step.before, step.after) for step in steps})
         detail = f"Software versions that got worse, of {words.count(pairs, 'change')} of version."

@@ -71,7 +71,9 @@ def cards(
     """The first of them, each with a piece of its map."""
     by_map = {(one.site, one.map_version): one for one in maps}
     return tuple(
-        _card(area, by_map.get((area.site, area.map_version)), images.get(area.map_version), reports)
+        _card(
+            area, by_map.get((area.site, area.map_version)), images.get(area.map_version), reports
+        )
         for area in areas[:MOST_CARDS]
     )
 
@@ -143,9 +145,7 @@ def _shades(places: MapPlaces | None) -> tuple[Shade, ...]:
     looks, against = blocks.greatest(places.looks), blocks.greatest(places.against)
     share = np.divide(against, looks, out=np.zeros_like(looks), where=looks > 0)
     classes = [""] * (len(_LEVELS) + 1)
-    return heat(
-        blocks, share, bounds=_LEVELS, classes=classes, texts=[""] * len(share)
-    ).shades
+    return heat(blocks, share, bounds=_LEVELS, classes=classes, texts=[""] * len(share)).shades
 
 
 def _still(area: Area) -> str:

@@ -133,7 +133,10 @@ def _traffic(places: Blocks, here: Array, at: Sequence[str]) -> Panel:
     most = float(here.max(initial=0.0))
     bounds = [most / 16, most / 8, most / 4, most / 2]
     edges = [words.hours(s / 3600.0) for s in (*bounds, most)]
-    classes = [f"up to {edges[0]}", *(f"{a} to {b}" for a, b in zip(edges, edges[1:], strict=False))]
+    classes = [
+        f"up to {edges[0]}",
+        *(f"{a} to {b}" for a, b in zip(edges, edges[1:], strict=False)),
+    ]
     texts = [f"{where}: {words.hours(s / 3600.0)}" for where, s in zip(at, here, strict=True)]
     return Panel(
         "here",

@@ -77,9 +77,7 @@ def versions_drawn(answers: Answers) -> tuple[str, ...]:
     return tuple(dict.fromkeys([*(a.map_version for a in areas), *(m.map_version for m in maps)]))
 
 
-def view_of(
-    answers: Answers, images: Mapping[str, MapImage], sql: Mapping[str, str]
-) -> FleetView:
+def view_of(answers: Answers, images: Mapping[str, MapImage], sql: Mapping[str, str]) -> FleetView:
     """The page of a fleet.
 
     Args:
@@ -126,8 +124,7 @@ def view_of(
         causes=logs.causes(answers.causes, reports),
         steps=step_table(answers.steps),
         groups=tuple(
-            group_table(what, answers.by[what])
-            for what in ("robot", "site", "map_version", "day")
+            group_table(what, answers.by[what]) for what in ("robot", "site", "map_version", "day")
         ),
         software=group_table("software", answers.by["software"]),
         gate_rows=_gate(answers),

@@ -1,0 +1,297 @@
+"""A folder that is watched: logs are looked back on as they become whole, round after round.
+
+It looks at intervals and depends on no notices of a file system, which a share or an object store
+does not send. Nothing is kept in memory alone: what is done stands in the batch's folder, so that a
+watch that was killed goes on, as a batch does, with what is missing.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import time
+from collections.abc import Callable, Generator, Iterator, Sequence
+from contextlib import AbstractContextManager, closing, contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from slamreplay.batch.cluster import Workers, kept_connected
+from slamreplay.batch.commit import commit_result, fates
+from slamreplay.batch.folder import batch_folder
+from slamreplay.batch.loop import looked_back
+from slamreplay.batch.settling import Looked, Settling, is_there
+from slamreplay.batch.task import LogResult, LogSource, LogTask
+from slamreplay.errors import OutputError, SlamreplayError
+
+#: The results of tasks, as `loop.looked_back` gives them.
+LookBack = Callable[[Sequence[LogTask]], Generator[LogResult]]
+
+#: What lacks to the machine and not to the log: it is tried again, for good.
+_PASSING = tuple(
+    os.strerror(number)
+    for number in (
+        errno.ENOSPC, errno.EDQUOT, errno.ESTALE, errno.EIO, errno.ENOTCONN, errno.ETIMEDOUT,
+        errno.EHOSTUNREACH, errno.ENETUNREACH, errno.ECONNREFUSED, errno.ECONNRESET, errno.EMFILE,
+    )
+)  # fmt: skip
+#: The longest time between two trials of such a log, s.
+_LONGEST_S = 3600.0
+
+
+@dataclass(frozen=True)
+class Pace:
+    """How a folder is watched.
+
+    Attributes:
+        every_s: time between two looks, and between trials where a folder cannot be written, s.
+        per_round: so many logs are done before the next look: the latest come first, so that what
+            happens now need not wait for all that happened before.
+        is_once: one look, all that is whole, and the end; a fault ends it then.
+    """
+
+    every_s: float = 30.0
+    per_round: int = 32
+    is_once: bool = False
+
+
+@dataclass(frozen=True)
+class Finished:
+    """A log whose rows and report are kept.
+
+    Attributes:
+        log: its path or address.
+        key: of the log and how it was read.
+        state: of its verdict; None of one that failed.
+        summary: the verdict in one sentence, or why it failed.
+        gate: passed, failed or skipped; None without a gate, and of one that failed.
+        report: folder of its report, None of one that failed.
+        has_failed: whether it could not be judged.
+    """
+
+    log: str
+    key: str
+    state: str | None
+    summary: str
+    gate: str | None
+    report: Path | None
+    has_failed: bool
+
+
+@dataclass
+class Tally:
+    """What a watch came to so far; it outlives a watch that is stopped.
+
+    Attributes:
+        finished: logs that were kept.
+        failed: of them, those that could not be judged.
+        gate_failed: of them, those whose gate failed.
+        lacking: logs that are not whole or cannot be tried now, with what they lack.
+        moving: logs that are still written to.
+    """
+
+    finished: int = 0
+    failed: int = 0
+    gate_failed: int = 0
+    lacking: dict[str, str] = field(default_factory=dict)
+    moving: int = 0
+
+
+def watch(
+    target: Path,
+    find: Callable[[], Sequence[LogSource]],
+    settling: Settling,
+    task_of: Callable[[LogSource], LogTask],
+    serve: Callable[[Path], AbstractContextManager[LookBack]],
+    *,
+    pace: Pace,
+    tell: Callable[[str], None],
+    finished: Callable[[Finished], None],
+    finish_round: Callable[[], None] = lambda: None,
+    tally: Tally | None = None,
+    sleep: Callable[[float], None] = time.sleep,
+) -> Tally:
+    """Look back on what becomes whole, until somebody stops it.
+
+    Args:
+        target: the batch's folder.
+        find: lists the logs there are.
+        settling: tells which of them are whole.
+        task_of: the task of a log.
+        serve: given a scratch folder, who looks back on tasks while the block lasts.
+        pace: how.
+        tell: told in a sentence what hinders, each thing once for as long as it does.
+        finished: told of each log that is kept.
+        finish_round: what is made anew after rounds in which something was kept: the page.
+        tally: is filled; a new one by default.
+        sleep: waits, s.
+
+    Raises:
+        SlamreplayError: the logs cannot be listed or the folder not be written, at the first look,
+            and with `is_once` whenever it is.
+    """
+    tally = Tally() if tally is None else tally
+    with batch_folder(target) as scratch, serve(scratch) as look_back:
+        rounds = _Rounds(
+            target, settling, task_of, look_back, pace, tell, finished, tally, sleep,
+            done=set(fates(target)),
+        )  # fmt: skip
+        is_first = True
+        while True:
+            looked = rounds.looked(find, is_first=is_first)
+            if looked is not None and pace.is_once and is_first and looked.moving:
+                sleep(settling.settle_s)
+                looked = rounds.looked(find, is_first=True)
+            kept = tally.finished
+            has_more = looked is not None and rounds.play(looked, is_first=is_first)
+            if tally.finished > kept:
+                rounds.written(finish_round)
+            if pace.is_once and not has_more:
+                return tally
+            is_first = False
+            if not has_more:
+                sleep(pace.every_s)
+
+
+@dataclass
+class _Rounds:
+    """What lasts from one round to the next."""
+
+    target: Path
+    settling: Settling
+    task_of: Callable[[LogSource], LogTask]
+    look_back: LookBack
+    pace: Pace
+    tell: Callable[[str], None]
+    finished: Callable[[Finished], None]
+    tally: Tally
+    sleep: Callable[[float], None]
+    done: set[str]
+    told: dict[str, str] = field(default_factory=dict)
+    tried: dict[str, int] = field(default_factory=dict)
+    not_before_s: dict[str, float] = field(default_factory=dict)
+
+    def looked(self, find: Callable[[], Sequence[LogSource]], *, is_first: bool) -> Looked | None:
+        """What is whole now; None while nothing can be listed."""
+        try:
+            sources = find()
+        except SlamreplayError as error:
+            if is_first or self.pace.is_once:
+                raise
+            self._tell("list", f"{error}; waiting for it")
+            return None
+        self._tell("list", "")
+        looked = self.settling.look(sources)
+        self.tally.lacking, self.tally.moving = dict(looked.lacking), looked.moving
+        for log, reason in looked.lacking.items():
+            self._tell(f"lacks {log}", f"{log}: not whole: {reason}; waiting for the rest")
+        for what in [
+            w for w in self.told if w.startswith("lacks ") and w[6:] not in looked.lacking
+        ]:
+            del self.told[what]
+        return looked
+
+    def play(self, looked: Looked, *, is_first: bool) -> bool:
+        """One round; whether logs are left for the next one, without waiting."""
+        todo: dict[str, tuple[LogTask, LogSource]] = {}
+        for source in looked.ready:
+            if len(todo) == self.pace.per_round:
+                break
+            if self.not_before_s.get(source.log, 0.0) > self.settling.now_s():
+                continue
+            try:
+                task = self.task_of(source)
+            except SlamreplayError as error:  # its map, say
+                self._put_off(source, str(error))
+                continue
+            if task.key in self.done:
+                self.settling.take(source)
+            else:
+                todo.setdefault(task.key, (task, source))
+        try:
+            with closing(self.look_back([task for task, _ in todo.values()])) as results:
+                for result in results:
+                    self._keep(result, todo[result.key][1])
+        except SlamreplayError as error:
+            if is_first or self.pace.is_once:
+                raise
+            self._tell("work", f"{error}; trying again every {self.pace.every_s:g} s")
+            return False
+        self._tell("work", "")
+        return len(todo) == self.pace.per_round
+
+    def written(self, write: Callable[[], None]) -> None:
+        """Write, again and again while the place takes nothing."""
+        while True:
+            try:
+                write()
+            except OutputError as error:
+                if self.pace.is_once:
+                    raise
+                self._tell("write", f"{error}; trying again every {self.pace.every_s:g} s")
+                self.sleep(self.pace.every_s)
+            else:
+                self._tell("write", "")
+                return
+
+    def _keep(self, result: LogResult, source: LogSource) -> None:
+        is_other = not self.settling.still_is(source)
+        if is_other and (is_there(source) or result.error is not None):
+            # What was read may be half of the old log and half of the new one.
+            self.tell(f"{source.log}: changed while it was read, so it waits again")
+            return
+        if result.error is not None and any(lack in result.error for lack in _PASSING):
+            self._put_off(source, result.error)
+            return
+        self.written(lambda: commit_result(self.target, result))
+        self.done.add(result.key)
+        if not is_other:
+            self.settling.take(source)
+        one = _finished(self.target, result)
+        self.tally.finished += 1
+        self.tally.failed += one.has_failed
+        self.tally.gate_failed += one.gate == "failed"
+        self.finished(one)
+
+    def _put_off(self, source: LogSource, why: str) -> None:
+        """Try a log again, later each time."""
+        times = self.tried[source.log] = self.tried.get(source.log, 0) + 1
+        wait_s = min(self.pace.every_s * 2.0 ** min(times - 1, 30), _LONGEST_S)
+        self.not_before_s[source.log] = self.settling.now_s() + wait_s
+        self.tally.lacking[source.log] = why
+        self._tell(f"put off {source.log}", f"{source.log}: {why}; trying it again later")
+
+    def _tell(self, what: str, line: str) -> None:
+        """Tell what hinders once, and that it no longer does; an empty line: it does not."""
+        if not line and what in self.told:
+            del self.told[what]
+            self.tell("that is over: going on")
+        elif line and self.told.get(what) != line:
+            self.told[what] = line
+            self.tell(line)
+
+
+def _finished(target: Path, result: LogResult) -> Finished:
+    (row,) = result.tables["logs"].to_pylist()
+    return Finished(
+        log=row["log"],
+        key=result.key,
+        state=row["state"],
+        summary=row["summary"] if result.error is None else result.error,
+        gate=row["gate"],
+        report=None if row["report"] is None else target / row["report"],
+        has_failed=result.error is not None,
+    )
+
+
+@contextmanager
+def served(workers: Workers, scratch: Path) -> Iterator[LookBack]:
+    """Workers that stay from round to round; one that is asked nothing is not even started.
+
+    Raises:
+        ClusterError: nobody answers at the scheduler's address.
+    """
+    with kept_connected() as connect:
+        if workers.scheduler is not None:
+            with connect(workers, scratch):
+                pass  # a wrong address is told now, not when the first log comes
+        yield lambda tasks: looked_back(tasks, workers, scratch, connect)

@@ -1,0 +1,249 @@
+"""`slamreplay watch`: post-mortems of logs as they come."""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from slamreplay.cli.batch import Cause, Count, MemoryLimit, Output, Scheduler
+from slamreplay.cli.options import Json
+from slamreplay.cli.terminal import complain, say_json
+from slamreplay.errors import LogError, UsageError
+
+if TYPE_CHECKING:
+    from slamreplay.batch.task import LogSource
+    from slamreplay.batch.watch import Finished, Tally
+    from slamreplay.gate.rules import Demands
+
+_FAILED, _UNREADABLE, _INTERRUPTED, _TERMINATED = 1, 2, 130, 143
+#: So many logs are done between two looks; more, where many workers would wait for the last one.
+_PER_ROUND, _PER_ROUND_OF_CLUSTER = 32, 512
+#: So many of what never became whole are told at the end; all of them were told when it was seen.
+_MOST_LACKING = 10
+#: The hook may take so long, s.
+_HOOK_S = 60.0
+
+Folder = Annotated[
+    str, typer.Argument(metavar="DIR", help="Where logs come in: a folder or an address (s3://...)")
+]
+Recipe = Annotated[
+    Path | None, typer.Option("--recipe", metavar="YAML", help="Hold each log against this gate.")
+]
+Every = Annotated[
+    float, typer.Option("--every", metavar="S", min=0.1, help="Time between two looks, in s.")
+]
+Settle = Annotated[
+    float,
+    typer.Option(
+        "--settle", metavar="S", min=0.0, help="Nobody may have written to a log for so long, in s."
+    ),
+]
+GiveUp = Annotated[
+    float,
+    typer.Option(
+        "--give-up",
+        metavar="S",
+        min=0.0,
+        help="A log that nobody closed is taken as it is after so long, in s.",
+    ),
+]
+Once = Annotated[
+    bool,
+    typer.Option("--once", help="One look, for cron; exit with 1 where a gate failed."),
+]
+OnFinished = Annotated[
+    str | None,
+    typer.Option(
+        "--on-finished", metavar="COMMAND", help="Run for each log, with JSON on its stdin."
+    ),
+]
+
+
+class _Terminated(KeyboardInterrupt):
+    """SIGTERM: a service is to end."""
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command."""
+    app.command(name="watch", help="Look back on logs of a folder as they become whole, for ever.")(
+        _watch
+    )
+
+
+def _watch(
+    folder: Folder,
+    output: Output,
+    recipe: Recipe = None,
+    every_s: Every = 30.0,
+    settle_s: Settle = 10.0,
+    give_up_s: GiveUp = 3600.0,
+    once: Once = False,
+    workers: Count = None,
+    memory_limit: MemoryLimit = None,
+    scheduler: Scheduler = None,
+    cause: Cause = True,
+    on_finished: OnFinished = None,
+    as_json: Json = False,
+) -> None:
+    from slamreplay.batch.cluster import Workers
+    from slamreplay.batch.keys import task_of
+    from slamreplay.batch.settling import Patience, Settling
+    from slamreplay.batch.watch import Pace, Tally, served, watch
+    from slamreplay.batch.whole import completeness
+
+    who = Workers(workers, memory_limit, scheduler).checked()
+    _check_apart(folder, output)
+    hook = _hook(on_finished)
+    demands = _demands(recipe)
+    per_round = _PER_ROUND if scheduler is None else _PER_ROUND_OF_CLUSTER
+    tally = Tally()
+
+    def finished(one: Finished) -> None:
+        told = _as_json(one)
+        if as_json:
+            say_json(told, indent=None)
+        complain(_line(one))
+        hook(told)
+
+    try:
+        with _terminable():
+            watch(
+                output,
+                lambda: _sources(folder),
+                Settling(Patience(settle_s, give_up_s), completeness),
+                lambda source: task_of(source, cause=cause, demands=demands),
+                lambda scratch: served(who, scratch),
+                pace=Pace(every_s, per_round, is_once=once),
+                tell=complain,
+                finished=finished,
+                finish_round=lambda: _write_pages(output),
+                tally=tally,
+            )
+    except KeyboardInterrupt as stop:
+        _show(tally, output)
+        if not isinstance(stop, _Terminated):
+            raise typer.Exit(_INTERRUPTED) from None
+        raise typer.Exit(_TERMINATED if once else 0) from None
+    _show(tally, output)
+    if tally.failed or tally.gate_failed:
+        raise typer.Exit(_UNREADABLE if tally.failed else _FAILED)
+
+
+def _check_apart(folder: str, output: Path) -> None:
+    """Refuse an output within the folder: each look would go through all reports."""
+    if Path(folder).resolve() in (output.resolve(), *output.resolve().parents):
+        raise UsageError("lies in the folder that is watched", where=output, hint="give another -o")
+
+
+def _sources(folder: str) -> list[LogSource]:
+    from slamreplay.batch.addresses import is_local
+    from slamreplay.batch.sources import NoLogError, sources_of
+
+    if is_local(folder) and not Path(folder).is_dir():
+        raise LogError("there is no such folder", where=folder)
+    try:
+        return sources_of([folder])
+    except NoLogError:
+        return []  # none yet
+
+
+def _demands(recipe: Path | None) -> Demands | None:
+    if recipe is None:
+        return None
+    from slamreplay.recipes import GateRecipe, read_recipe
+
+    read = read_recipe(recipe)
+    if not isinstance(read, GateRecipe):
+        raise UsageError("is no recipe of a gate", where=recipe, hint="see recipes/ci-gate")
+    return read.demands
+
+
+def _write_pages(output: Path) -> None:
+    """The fleet's page and queries, of all that is in the folder now."""
+
+
+@contextmanager
+def _terminable() -> Iterator[None]:
+    """Within it SIGTERM ends what goes on as Ctrl-C does."""
+
+    def end(_number: int, _frame: Any) -> None:
+        signal.signal(signal.SIGTERM, signal.SIG_IGN)  # told once is enough
+        raise _Terminated
+
+    before = signal.signal(signal.SIGTERM, end)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
+def _hook(command: str | None) -> Callable[[dict[str, object]], None]:
+    """Runs a command without a shell; what it says goes where ours goes."""
+    import shlex
+
+    try:
+        words = shlex.split(command or "")
+    except ValueError as error:
+        raise UsageError(f"--on-finished: {error}") from error
+    if command is not None and not words:
+        raise UsageError("--on-finished has no command")
+    return (lambda told: _run(words, told)) if words else (lambda _told: None)
+
+
+def _run(words: Sequence[str], told: dict[str, object]) -> None:
+    import json
+    import subprocess
+
+    text = json.dumps(told) + "\n"
+    try:
+        code = subprocess.run(words, input=text.encode(), timeout=_HOOK_S, check=False).returncode
+    except subprocess.TimeoutExpired:
+        complain(f"{words[0]}: took longer than {_HOOK_S:g} s and was ended")
+    except OSError as error:
+        complain(f"{words[0]}: {error.strerror or error}")
+    else:
+        if code:
+            complain(f"{words[0]}: exit code {code}")
+
+
+def _as_json(one: Finished) -> dict[str, object]:
+    return {
+        "time": _now(),
+        "log": one.log,
+        "key": one.key,
+        "failed": one.has_failed,
+        "state": one.state,
+        "summary": one.summary,
+        "gate": one.gate,
+        "report": None if one.report is None else str(one.report),
+    }
+
+
+def _line(one: Finished) -> str:
+    if one.has_failed:
+        return f"{_now()} {one.log}: failed: {one.summary}"
+    gate = "" if one.gate is None else f", gate {one.gate}"
+    page = "" if one.report is None else f": {one.report / 'report.html'}"
+    return f"{_now()} {one.log}: {one.state}{gate}{page}"
+
+
+def _now() -> str:
+    return f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ}"
+
+
+def _show(tally: Tally, output: Path) -> None:
+    for log, reason in sorted(tally.lacking.items())[:_MOST_LACKING]:
+        complain(f"{log}: not done: {reason}")
+    if len(tally.lacking) > _MOST_LACKING:
+        complain(f"and {len(tally.lacking) - _MOST_LACKING} more that are not done")
+    parts = [f"{tally.finished} logs done"]
+    parts += [f"{tally.failed} failed"] if tally.failed else []
+    parts += [f"the gate failed in {tally.gate_failed}"] if tally.gate_failed else []
+    parts += [f"{tally.moving} still being written"] if tally.moving else []
+    complain(f"{', '.join(parts)}; all is kept in {output}: the same command goes on")

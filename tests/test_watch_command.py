@@ -1,0 +1,82 @@
+"""The program as a service: it picks up what comes, and ends when it is told to."""
+
+import json
+import signal
+import time
+
+import pytest
+from batch_folders import (
+    check_whole,
+    committed,
+    finished,
+    lives,
+    start,
+    wait_until,
+    workers_of,
+    write_tiny_log,
+)
+
+
+@pytest.fixture
+def place(tmp_path):
+    (tmp_path / "in").mkdir()
+    return tmp_path / "in"
+
+
+def test_from_a_half_written_log_to_its_report_until_sigterm(place, tmp_path, logs_in):
+    log = write_tiny_log(logs_in(tmp_path), "a.mcap")
+    content, out, heard = log.read_bytes(), tmp_path / "out", tmp_path / "heard"
+    hook = f"tee -a {heard}"
+    options = ("--every", 0.2, "--settle", 0.2, "--workers", 1, "--no-cause", "--json")
+
+    (place / "a.mcap").write_bytes(content[:-40])
+    program = start("watch", place, "-o", out, *options, "--on-finished", hook)
+    wait_until((out / "batch.json").exists)
+    time.sleep(1.0)
+    assert committed(out) == 0
+    (place / "a.mcap").write_bytes(content)
+    wait_until(lambda: heard.exists() and heard.read_bytes().endswith(b"\n"))
+    workers = workers_of(program)
+    asked = time.monotonic()
+    program.send_signal(signal.SIGTERM)
+    code, said, err = finished(program)
+
+    assert (code, len(workers)) == (0, 1)
+    assert time.monotonic() - asked < 8.0
+    wait_until(lambda: not any(map(lives, workers)), timeout=5)
+    told = json.loads(said.splitlines()[0])
+    assert (told["log"], told["state"]) == (str(place / "a.mcap"), "insufficient_data")
+    assert json.loads(heard.read_text()) == told
+    lines = err.splitlines()
+    assert "not whole: it has no footer yet" in lines[0]
+    assert f"{place / 'a.mcap'}: insufficient_data: {out}/logs/a.mcap-" in lines[1]
+    assert lines[2].startswith("1 logs done; ")
+    check_whole(out, done=1, failed=0)
+
+
+def test_once_on_nothing_new(place, tmp_path):
+    code, said, err = finished(start("watch", place, "-o", tmp_path / "out", "--once"))
+
+    assert (code, said) == (0, "")
+    assert err.startswith("0 logs done; ")
+
+
+@pytest.mark.parametrize(
+    ("options", "line"),
+    [
+        (("misspelt", "-o", "out"), "there is no such folder"),
+        ((".", "-o", "out"), "lies in the folder that is watched"),
+        (("in", "-o", "out", "--on-finished", "'"), "--on-finished: No closing quotation"),
+        (("in", "-o", "out", "--on-finished", " "), "--on-finished has no command"),
+        (("in", "-o", "out", "--workers", "0"), "0 workers do no work"),
+    ],
+)
+def test_what_makes_no_sense_gets_one_line(place, tmp_path, options, line, monkeypatch, capsys):
+    from slamreplay.cli.main import run
+
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("sys.argv", ["slamreplay", "watch", *options])
+
+    assert run() == 2
+    (said,) = capsys.readouterr().err.splitlines()
+    assert line in said
