@@ -214,5 +214,5 @@ def test_many_checks_leave_room_for_logs():
 def test_logs_that_are_well_are_folded():
     made = gated.result(*(gated.log(f"l/{k}", gated.outcome(status="passed")) for k in range(25)))
 
-    assert "<details><summary>25 logs</summary>" in step_summary(made)
+    assert "\n### Logs\n\n<details><summary>25 logs</summary>" in step_summary(made)
     assert step_summary(made).startswith("## Gate: passed\n")

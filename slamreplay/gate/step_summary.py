@@ -47,7 +47,8 @@ def step_summary(result: GateResult, *, artifacts: str | None = None) -> str:
         parts += [_left_out(left_out, "check")] * bool(left_out)
     room = MOST_BYTES - _CLOSING_BYTES - sum(_size(part) for part in parts)
     logs = sorted(result.logs, key=lambda log: STATUSES.index(log.status))
-    for title, statuses in (("Logs that failed", STATUSES[:2]), ("Other logs", STATUSES[2:])):
+    others = "Other logs" if by_check else "Logs"
+    for title, statuses in (("Logs that failed", STATUSES[:2]), (others, STATUSES[2:])):
         rows = [_row(log, linked=not artifacts) for log in logs if log.status in statuses]
         if not rows:
             continue
