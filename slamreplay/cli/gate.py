@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -11,7 +14,7 @@ import typer
 
 from slamreplay.cli import completion, options
 from slamreplay.cli.report import Cause
-from slamreplay.cli.terminal import complain, say_json
+from slamreplay.cli.terminal import complain, say_json, say_path
 from slamreplay.errors import OutputError, UsageError
 
 if TYPE_CHECKING:
@@ -113,15 +116,15 @@ def gate(
     )
     gating = Gating(demands, recipe.as_posix(), how, cause, before,
                     "" if baseline is None else baseline.as_posix())  # fmt: skip
-    done = judged(logs, gating, output)
-    for path, kind in files.items():
-        _write(path, done.result, kind)
-    if github:  # before the last line, which is the path
-        _tell_github(done.result)
-    if as_json:
-        say_json(done.json)
-    else:
-        show_result(done.result, output)
+    with _quoting(github):
+        done = judged(logs, gating, output)
+        for path, kind in files.items():
+            _write(path, done.result, kind)
+        if as_json:
+            say_json(done.json)
+        else:
+            show_result(done.result)
+    _end(done.result, None if as_json or output is None else output / MARKER, github)
     if done.fault is not None:
         raise done.fault
     if done.result.exit_code:
@@ -163,8 +166,28 @@ def _warn_of_patterns(demands: Demands, names: list[str]) -> None:
             complain(f"the recipe's rules of {pattern!r} are of none of these logs")
 
 
+@contextmanager
+def _quoting(github: bool) -> Iterator[None]:
+    """While this holds no text of a log is taken for a command by the runner of GitHub Actions."""
+    from slamreplay.gate.github import commands_stopped
+
+    if not github:
+        yield
+        return
+    with commands_stopped(partial(typer.echo, nl=False)):
+        yield
+
+
+def _end(result: GateResult, path: Path | None, github: bool) -> None:
+    """What GitHub reads, and last of all the path, alone, for scripts."""
+    if github:
+        _tell_github(result)
+    if path is not None:
+        say_path(path)
+
+
 def _tell_github(result: GateResult) -> None:
-    from slamreplay.gate.github import annotations, step_summary
+    from slamreplay.gate.github import annotations, artifacts_of, step_summary
 
     typer.echo(annotations(result), nl=False)
     summary = os.environ.get("GITHUB_STEP_SUMMARY")
@@ -173,6 +196,6 @@ def _tell_github(result: GateResult) -> None:
         return
     try:
         with Path(summary).open("a", encoding="utf-8") as stream:
-            stream.write(step_summary(result))
+            stream.write(step_summary(result, artifacts=artifacts_of(os.environ)))
     except OSError as error:
         complain(f"{summary}: cannot add the summary: {error.strerror or error}")

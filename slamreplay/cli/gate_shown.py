@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING
 
-from slamreplay.cli.terminal import say, say_path, say_table
+from slamreplay.cli.terminal import say, say_table
 from slamreplay.gate.failures import failures, span_s
 from slamreplay.gate.result_file import counted
 
@@ -29,8 +28,8 @@ _WORDS: dict[Status, str] = {
 }
 
 
-def show_result(result: GateResult, output: Path | None) -> None:
-    """Print it; the folder's path comes last, alone, for scripts."""
+def show_result(result: GateResult) -> None:
+    """Print it."""
     say((result.question, "head"))
     head: list[Cell] = ["", "log", "state", "passed", "failed", "skipped"]
     say_table([head, *map(_row, result.logs)], numbers=range(3, 6))
@@ -42,8 +41,6 @@ def show_result(result: GateResult, output: Path | None) -> None:
               for s in _WORDS if any(log.status == s for log in result.logs)]  # fmt: skip
     say()
     say((words[result.exit_code], tone), f": {', '.join(counts)} ({result.recipe})")
-    if output is not None:
-        say_path(output / "gate.json")
 
 
 def _row(log: GatedLog) -> list[Cell]:
