@@ -17,8 +17,14 @@ from importlib.metadata import files
 import jsonschema
 import pytest
 import yaml
+from ci_rules import code_quality, commands, junit, sarif
 from conftest import ROOT
 
+_RUN = {
+    "GITHUB_SERVER_URL": "https://github.example",
+    "GITHUB_REPOSITORY": "o/r",
+    "GITHUB_RUN_ID": "7",
+}
 CI_GATE = ROOT / "recipes" / "ci-gate"
 _PROGRAM = """#!{python}
 import json, os, sys
@@ -204,6 +210,42 @@ def test_the_last_step_ends_as_the_gate_did(job, fail_on, code, ends):
     job.values |= {"inputs.fail-on": fail_on, "steps.gate.outputs.exit-code": code}
 
     assert job.run("Pass or fail").returncode == ends
+
+
+def test_the_action_runs_the_gate_itself(job):
+    """With the program, on a sample log: what it leaves for the uploads keeps the rules."""
+    job.program("slamreplay", '#!/bin/sh\nexec {python} -m slamreplay.cli.main "$@"\n')
+    work = job.folder / "work"
+    shutil.copy(ROOT / "sample_logs" / "healthy_short.bag", work / "a log.bag")
+    (work / "broken.bag").write_bytes(b"::error::no log")
+    (work / "gate.yaml").write_text(
+        "version: 1\nquestion: Does it?\nexpect: [state=healthy]\nlimits: {error_max_m: 0.001}\n"
+    )
+    job.values |= {
+        "inputs.logs": "*.bag",
+        "inputs.recipe": "gate.yaml",
+        "inputs.arguments": "--no-cause",
+    }
+
+    done = job.run("Judge the logs", PYTHONPATH=str(ROOT), **_RUN)
+
+    assert (done.returncode, job.outputs) == (0, {"exit-code": "2", "sarif": "true"})
+    out = work / "gate"
+    texts = {path.name: path.read_text() for path in out.iterdir() if path.is_file()}
+    assert junit(texts["junit.xml"]).get("failures") == "1"
+    found = sarif(texts["gate.sarif"])["results"]
+    assert [one["ruleId"] for one in found] == ["read", "limit/error_max_m"]
+    assert [one["location"]["path"] for one in code_quality(texts["gl-code-quality.json"])] == [
+        "broken.bag", "a log.bag",
+    ]  # fmt: skip
+    stopped, told = done.stdout.split("\n", 1)
+    told = told.split(f"::{stopped.split('::')[2]}::\n")[1]
+    assert [given["file"] for _, given, _ in commands(told.rsplit("\n", 2)[0])] == [
+        "broken.bag", "a log.bag",
+    ]  # fmt: skip
+    summary = (job.folder / "summary").read_text()
+    assert "https://github.example/o/r/actions/runs/7#artifacts" in summary
+    assert (out / "logs" / "a_log" / "report.html").is_file()
 
 
 _PYTHON3 = """#!/bin/bash

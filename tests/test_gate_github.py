@@ -5,42 +5,13 @@ from html.parser import HTMLParser
 
 import gated
 import pytest
+from ci_rules import commands
 from hypothesis import given
 from hypothesis import strategies as st
 from markdown_it import MarkdownIt
 
 from slamreplay.gate.github import annotations, artifacts_of, commands_stopped, step_summary
 from slamreplay.gate.step_summary import MOST_BYTES
-
-
-def commands(text):
-    """(command, properties, message) as actions/runner's ActionCommand.cs takes them from lines.
-
-    A line that is no command of these three is a break-out.
-    """
-    taken = []
-    for line in re.split(r"\r\n|\r|\n", text):
-        if not line:
-            continue
-        found = re.fullmatch(r"::(error|warning|notice) (.*?)::(.*)", line, re.DOTALL)
-        assert found, line
-        pairs = [pair.split("=", 1) for pair in found[2].split(",")]
-        unescape = [("%0D", "\r"), ("%0A", "\n"), ("%3A", ":"), ("%2C", ","), ("%25", "%")]
-        taken.append((found[1], {k: unescaped(v, unescape) for k, v in pairs},
-                      unescaped(found[3], [x for x in unescape if x[1] not in ":,"])))  # fmt: skip
-    for kind in ("error", "warning", "notice"):  # actions/toolkit docs/problem-matchers.md
-        assert sum(command == kind for command, _, _ in taken) <= 10
-    for _, properties, message in taken:
-        assert set(properties) <= {"file", "title"}
-        assert len(message) <= 4096  # actions/runner _maxIssueMessageLength
-        assert len(properties["title"]) <= 255  # checks API
-    return taken
-
-
-def unescaped(text, pairs):
-    for escaped, plain in pairs:
-        text = text.replace(escaped, plain)
-    return text
 
 
 def test_one_annotation_for_each_check_worst_first():

