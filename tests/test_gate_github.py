@@ -132,6 +132,7 @@ def test_summary_tells_what_failed_then_every_log_worst_first():
     )
     assert rows[6].startswith("./logs/b c.mcap failed")
     assert [row.split()[0] for row in rows[8:]] == ["logs/d", "logs/a.mcap"]
+    assert rows[8].endswith("not assessable: what forbid/SR-LOC-001 demands: no map")
     assert "(reports/b%20c/report.html)" in text
 
 

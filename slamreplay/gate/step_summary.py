@@ -95,11 +95,17 @@ def _row(log: GatedLog, *, linked: bool) -> tuple[str, ...]:
     name = _cell(log.log)
     if log.report is not None and linked:
         name = f"[{name}]({quote(clean(log.report).strip('/'))}/report.html)"
-    quoted = [x for x in log.outcomes if x.status in ("error", "failed")]
-    quoted = quoted or [x for x in log.outcomes if x.status == "skipped"]
-    why = _quoted(map(told, quoted), len(quoted), _QUOTED) if quoted else _cell(log.summary)
     state = STATES[log.state].name if log.state in STATES else log.state or ""
-    return name, _WORDS[log.status], _cell(state), why
+    return name, _WORDS[log.status], _cell(state), _why(log)
+
+
+def _why(log: GatedLog) -> str:
+    """What failed; where nothing did what could not be assessed, after the verdict's summary."""
+    failed = [x for x in log.outcomes if x.status in ("error", "failed")]
+    if failed:
+        return _quoted(map(told, failed), len(failed), _QUOTED)
+    skipped = [f"not assessable: {told(x)}" for x in log.outcomes if x.status == "skipped"]
+    return _quoted((log.summary, *skipped), 1 + len(skipped), _QUOTED)
 
 
 def _quoted(texts: Iterable[str], count: int, most: int) -> str:
