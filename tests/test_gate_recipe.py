@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from slamreplay.errors import UsageError
-from slamreplay.gate.rules import Limit, Rules
+from slamreplay.gate.rules import BaselineRules, Limit, Rules
 from slamreplay.recipes import GateRecipe, read_recipe
 
 GATE = """\
@@ -23,6 +23,7 @@ limits:
   hindsight_coverage: {min: 0.9}
 estimators: [amcl]
 seeds: 2
+baseline: {alpha: 0.01, margins: {error_mean_m: 0.05, amcl.error_max_m: 0.1}}
 logs:
   lost*:
     expect: [state=lost, SR-CON-010]
@@ -48,6 +49,7 @@ def test_the_keys_at_the_top_hold_for_every_log(tmp_path):
         ("amcl",),
         2,
     )
+    assert demands.baseline == BaselineRules(0.01, {"error_mean_m": 0.05, "amcl.error_max_m": 0.1})
     assert demands.rules_of("logs/healthy.mcap") == Rules(
         ("state=healthy",),
         ("SR-LOC-*", "failure_mode=kidnapped"),
@@ -152,6 +154,10 @@ MISTAKES = {
     "rules": (GATE.replace("logs:\n  lost*:\n", "logs:\n  a*: 3\n  lost*:\n"), "'logs.a*'"),
     "key": (GATE.replace("max_severity: w", "max_severty: w"), "did you mean 'max_severity'?"),
     "inner key": (GATE.replace("    forbid:", "    forbit:"), "did you mean 'forbid'?"),
+    "alpha": (GATE.replace("alpha: 0.01", "alpha: 5"), "'baseline.alpha' is 5"),
+    "margin": (GATE.replace("error_mean_m:", "error_men_m:"), "did you mean 'error_mean_m'?"),
+    "odd key": (GATE.replace("error_mean_m: 0.05", '"\\e[31m": x'), "margins.\\x1b[31m' is 'x'"),
+    "less": (GATE.replace("error_mean_m: 0", "error_mean_m: -1"), "greater than or equal to 0"),
     "nothing": ("version: 1\nquestion: Is it?\nmax_severity: error\n", "it demands nothing"),
     "no question": (GATE.replace("question:", "# "), "the key 'question' is missing"),
     "lines": (GATE.replace("Does every", '"Does\\nevery').replace("must?", 'must?"'), "one line"),
