@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from typing import TYPE_CHECKING
 
 from slamreplay.cli.terminal import say, say_table
@@ -37,10 +38,12 @@ def show_result(result: GateResult) -> None:
     _show_failures(result)
     tone: Tone = "bad" if result.exit_code else "good"
     words = {0: "The gate passes", 1: "The gate fails", 2: "A log could not be read"}
-    counts = [f"{sum(log.status == s for log in result.logs)} {_WORDS[s].lower()}"
-              for s in _WORDS if any(log.status == s for log in result.logs)]  # fmt: skip
+    # What stands for all logs together, under the baseline's path, is none of them.
+    counts = Counter(log.status for log in result.logs
+                     if log.state is not None or log.status == "error")  # fmt: skip
+    told = ", ".join(f"{counts[s]} {_WORDS[s].lower()}" for s in _WORDS if counts[s])
     say()
-    say((words[result.exit_code], tone), f": {', '.join(counts)} ({result.recipe})")
+    say((words[result.exit_code], tone), f": {told} ({result.recipe})")
 
 
 def _row(log: GatedLog) -> list[Cell]:
@@ -48,7 +51,7 @@ def _row(log: GatedLog) -> list[Cell]:
     return [
         (_WORDS[log.status], _TONES[log.status]),
         log.log,
-        log.state or "-",
+        log.state or ("-" if log.status == "error" else "all logs"),
         str(counts["passed"]),
         str(counts["failed"] + counts["error"]),
         str(counts["skipped"]),

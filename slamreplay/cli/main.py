@@ -24,8 +24,8 @@ EXIT_INPUT, EXIT_FAULT, EXIT_INTERRUPTED = 2, 70, 130
 
 #: Command modules, in the order of the help; each has `register(app)` and imports nothing heavy.
 COMMANDS = (
-    "report", "gate", "batch", "watch", "ingest", "inspect", "perturb", "export", "simulate", "bench",
-    "explain", "list_",
+    "report", "gate", "batch", "watch", "ingest", "inspect", "perturb", "export", "simulate",
+    "bench", "explain", "list_",
 )  # fmt: skip
 
 #: What every usage error is: typer carries a click of its own, so it is asked for its base class.
