@@ -17,8 +17,9 @@ from slamreplay.bundle.findings import Severity
 from slamreplay.errors import UsageError
 from slamreplay.estimators import RECORDED
 from slamreplay.gate.asked import asked
+from slamreplay.gate.baseline_metrics import check_margin
 from slamreplay.gate.metrics import metric_of
-from slamreplay.gate.rules import Demands, Limit, Rules
+from slamreplay.gate.rules import BaselineRules, Demands, Limit, Rules
 from slamreplay.labs.lab import Strict
 from slamreplay.recipes.dose_recipe import check_estimators
 from slamreplay.recipes.validation import one_line, validated
@@ -52,6 +53,13 @@ class RulesPart(Strict):
     require_assessable: bool | None = None
 
 
+class BaselinePart(Strict):
+    """When a difference from the committed baseline counts."""
+
+    alpha: Annotated[float, Field(gt=0.0, le=0.5)] = BaselineRules.alpha
+    margins: dict[str, Annotated[float, Field(ge=0.0, le=1e9)]] = Field(default_factory=dict)
+
+
 class GateFile(RulesPart):
     """The keys of the file."""
 
@@ -60,6 +68,7 @@ class GateFile(RulesPart):
     estimators: Annotated[list[_Name], Field(max_length=50)] = Field(default_factory=list)
     seeds: Annotated[int, Field(ge=1, le=200)] = 1
     logs: dict[str, RulesPart] = Field(default_factory=dict)
+    baseline: BaselinePart = Field(default_factory=BaselinePart)
 
 
 @dataclass(frozen=True)
@@ -107,7 +116,10 @@ def gate_recipe(given: Mapping[str, Any], path: Path) -> GateRecipe:
         raise UsageError(
             "it demands nothing", where=path, hint=f"write one of {', '.join(KEYS[:-1])}"
         )
-    return GateRecipe(Demands(file.question, top, of_logs, estimators, file.seeds))
+    for name in file.baseline.margins:
+        _at(f"baseline.margins.{name}", path, check_margin, name, estimators)
+    baseline = BaselineRules(file.baseline.alpha, file.baseline.margins)
+    return GateRecipe(Demands(file.question, top, of_logs, estimators, file.seeds, baseline))
 
 
 def _rules(
