@@ -34,6 +34,7 @@ from slamreplay.gate.baseline_metrics import is_worse, margin_of
 from slamreplay.gate.measures import Measure, Measures, Series
 from slamreplay.gate.outcome import Outcome
 from slamreplay.gate.rules import BaselineRules
+from slamreplay.recipes.recipe import read_recipe
 
 S = 1_000_000_000
 RULES = BaselineRules()
@@ -423,3 +424,38 @@ def test_any_numbers_make_a_difference_without_a_warning(old, new):
         assert found.p_value is None or 0.0 <= found.p_value <= 1.0
         if size:
             assert np.isfinite(found.mean)
+
+
+def recipe(tmp_path, text):
+    path = tmp_path / "gate.yaml"
+    path.write_text(
+        f"version: 1\nquestion: as before?\nmax_severity: error\nlimits: {{error_max_m: 1}}\n{text}"
+    )
+    return read_recipe(path)
+
+
+def test_a_recipe_sets_level_and_margins(tmp_path):
+    read = recipe(
+        tmp_path,
+        "estimators: [amcl]\n"
+        "baseline: {alpha: 0.01, margins: {error_mean_m: 0.05, amcl.error_max_m: 0.2}}\n",
+    )
+    margins = {"error_mean_m": 0.05, "amcl.error_max_m": 0.2}
+    assert read.demands.baseline == BaselineRules(0.01, margins)
+    assert recipe(tmp_path, "").demands.baseline == BaselineRules()
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("{alpha: 0}", "baseline.alpha"),
+        ("{alfa: 0.1}", "alpha"),
+        ("{margins: {error_m: 0.1}}", "write error_mean_m"),
+        ("{margins: {eror_mean_m: 0.1}}", "error_mean_m"),
+        ("{margins: {amcl.error_max_m: 0.1}}", "not compared"),
+        ("{margins: {error_mean_m: -1}}", "baseline.margins.error_mean_m"),
+    ],
+)
+def test_a_recipe_that_makes_no_sense_is_refused(tmp_path, text, said):
+    with pytest.raises(UsageError, match=said):
+        recipe(tmp_path, f"baseline: {text}\n")
