@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -32,12 +32,13 @@ class Fate:
     error: str | None
 
 
-def commit_result(target: Path, result: LogResult) -> None:
+def commit_result(target: Path, result: LogResult, tell: Callable[[str], None]) -> None:
     """Keep a result. Its rows come last: a log without them is done again, one with them is whole.
 
     Args:
         target: folder of the batch.
         result: of a log, failed ones included.
+        tell: told in a line what of the tables turns out to be damaged.
 
     Raises:
         OutputError: the place cannot be written.
@@ -49,12 +50,12 @@ def commit_result(target: Path, result: LogResult) -> None:
         place = target / map_folder(row["map_version"])
         if not (place / _MAP_MARKER).exists():
             _write(place, result.map_files, _MAP_MARKER)
-    commit(target, result.tables)
+    commit(target, result.tables, tell)
 
 
-def fates(target: Path) -> dict[str, Fate]:
-    """What became of every log that the folder has, by key."""
-    return _fates(read(target, "logs"))
+def fates(target: Path, tell: Callable[[str], None]) -> dict[str, Fate]:
+    """What became of every log that the folder has, by key; `tell` as of `commit_result`."""
+    return _fates(read(target, "logs", tell))
 
 
 def fate_of(result: LogResult) -> Fate:

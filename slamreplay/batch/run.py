@@ -16,8 +16,6 @@ from slamreplay.batch.loop import looked_back
 from slamreplay.batch.task import LogTask
 from slamreplay.fleet.store import compact
 
-#: Rows come as a folder per log; so many of those become one.
-_COMPACT_EVERY = 100
 _MB = 1e6
 
 
@@ -42,6 +40,10 @@ class BatchEnd:
     seconds: float
 
 
+def _silent(_line: str) -> None:
+    pass
+
+
 def run_batch(
     tasks: Sequence[LogTask],
     target: Path,
@@ -49,6 +51,7 @@ def run_batch(
     *,
     again_failed: bool = False,
     progress: Callable[[str, float], None] | None = None,
+    tell: Callable[[str], None] = _silent,
 ) -> BatchEnd:
     """Look back on every log that is not in the folder yet, and keep each as it is done.
 
@@ -60,6 +63,7 @@ def run_batch(
         workers: who does it.
         again_failed: try those again that failed before.
         progress: told how many are done, and the share done.
+        tell: told in a line what of the folder turned out to be damaged; its logs are done again.
 
     Raises:
         OutputError: the folder is somebody else's, in use, or cannot be written.
@@ -68,8 +72,7 @@ def run_batch(
     begun = time.monotonic()
     tasks = list({task.key: task for task in reversed(tasks)}.values())[::-1]
     with batch_folder(target) as scratch:
-        compact(target)  # also clears what one that was killed left
-        before = fates(target)
+        before = fates(target, tell)
         told = {
             task.key: before[task.key]
             for task in tasks
@@ -80,13 +83,11 @@ def run_batch(
         say = _Telling(todo, len(tasks), progress)
         say(told)
         with closing(looked_back(todo, workers, scratch)) as results:
-            for n, result in enumerate(results, start=1):
-                commit_result(target, result)
+            for result in results:
+                commit_result(target, result, tell)
                 told[result.key] = fate_of(result)
                 say(told, result.key)
-                if n % _COMPACT_EVERY == 0:
-                    compact(target)
-        compact(target)
+        compact(target, tell)
     states = Counter(fate.state for fate in told.values() if fate.state is not None)
     failed = [(task.source.log, told[task.key].error) for task in tasks]
     return BatchEnd(

@@ -77,7 +77,9 @@ def _batch(
     try:
         tasks = [task_of(source, cause=cause) for source in sources_of(places, tell=complain)]
         with progress_bar("looking back") as progress:
-            end = run_batch(tasks, output, who, again_failed=again_failed, progress=progress)
+            end = run_batch(
+                tasks, output, who, again_failed=again_failed, progress=progress, tell=complain
+            )
     except KeyboardInterrupt:
         complain(f"stopped; what is done is kept in {output}: the same command again goes on")
         raise typer.Exit(_INTERRUPTED) from None
