@@ -38,8 +38,9 @@ _LOCAL = {
     "distributed.scheduler.allowed-failures": 0,
     "distributed.scheduler.worker-ttl": None,
     "distributed.admin.low-level-log-length": 100,
-    "distributed.admin.large-graph-warning-threshold": "1GiB",
 }
+#: A map that is sent along is as large as it is.
+_CLIENT = {"distributed.admin.large-graph-warning-threshold": "1GiB"}
 
 
 class ClusterError(SlamreplayError):
@@ -96,10 +97,13 @@ def connected(workers: Workers, scratch: Path) -> Iterator[Client]:
         ClusterError: nobody answers at the address, or somebody with other versions.
         UsageError: the address is none.
     """
+    import dask
     from distributed import Client
 
     with _quiet(), ExitStack() as ends:
+        ends.enter_context(dask.config.set(_CLIENT))
         if workers.scheduler is None:
+            ends.enter_context(dask.config.set(_LOCAL))
             with _interrupts_later():
                 cluster = _local(workers, scratch)
                 ends.callback(_close, cluster)
@@ -133,24 +137,22 @@ def kept_connected() -> Iterator[Connect]:
 
 
 def _local(workers: Workers, scratch: Path) -> LocalCluster:
-    import dask
     from distributed import LocalCluster
 
     limit = {} if workers.memory_limit is None else {"memory_limit": workers.memory_limit}
-    with dask.config.set(_LOCAL):
-        return LocalCluster(
-            n_workers=workers.count,
-            threads_per_worker=1,
-            processes=True,
-            dashboard_address=None,
-            # Its scheduler listens all the same, and two batches on one machine want one port.
-            scheduler_kwargs={"dashboard_address": "localhost:0"},
-            silence_logs=logging.CRITICAL + 1,
-            local_directory=str(scratch),
-            env={"NUMBA_NUM_THREADS": "1"},
-            preload=["slamreplay.batch.own_worker"],
-            **limit,
-        )
+    return LocalCluster(
+        n_workers=workers.count,
+        threads_per_worker=1,
+        processes=True,
+        dashboard_address=None,
+        # Its scheduler listens all the same, and two batches on one machine want one port.
+        scheduler_kwargs={"dashboard_address": "localhost:0"},
+        silence_logs=logging.CRITICAL + 1,
+        local_directory=str(scratch),
+        env={"NUMBA_NUM_THREADS": "1"},
+        preload=["slamreplay.batch.own_worker"],
+        **limit,
+    )
 
 
 @contextmanager

@@ -18,6 +18,12 @@ if TYPE_CHECKING:
 
 _MAP_MARKER = "map.yaml"
 
+Tell = Callable[[str], None]
+
+
+def silent(_line: str) -> None:
+    """Tell nobody."""
+
 
 @dataclass(frozen=True)
 class Fate:
@@ -26,13 +32,15 @@ class Fate:
     Attributes:
         state: of its verdict; None of one that failed.
         error: why it failed, in one line; None of one that did not.
+        gate: passed, failed or skipped; None without a gate.
     """
 
     state: str | None
     error: str | None
+    gate: str | None
 
 
-def commit_result(target: Path, result: LogResult, tell: Callable[[str], None]) -> None:
+def commit_result(target: Path, result: LogResult, tell: Tell = silent) -> None:
     """Keep a result. Its rows come last: a log without them is done again, one with them is whole.
 
     Args:
@@ -53,7 +61,7 @@ def commit_result(target: Path, result: LogResult, tell: Callable[[str], None]) 
     commit(target, result.tables, tell)
 
 
-def fates(target: Path, tell: Callable[[str], None]) -> dict[str, Fate]:
+def fates(target: Path, tell: Tell = silent) -> dict[str, Fate]:
     """What became of every log that the folder has, by key; `tell` as of `commit_result`."""
     return _fates(read(target, "logs", tell))
 
@@ -64,8 +72,8 @@ def fate_of(result: LogResult) -> Fate:
 
 
 def _fates(logs: pa.Table) -> dict[str, Fate]:
-    columns = (logs.column(name).to_pylist() for name in ("key", "state", "error"))
-    return {key: Fate(state, error) for key, state, error in zip(*columns, strict=True)}
+    columns = (logs.column(name).to_pylist() for name in ("key", "state", "error", "gate"))
+    return {key: Fate(*told) for key, *told in zip(*columns, strict=True)}
 
 
 def _write(folder: Path, files: Mapping[str, bytes], marker: str) -> None:

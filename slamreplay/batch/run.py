@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import time
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 
 from slamreplay.batch.cluster import Workers
-from slamreplay.batch.commit import Fate, commit_result, fate_of, fates
+from slamreplay.batch.commit import Fate, Tell, commit_result, fate_of, fates, silent
 from slamreplay.batch.folder import batch_folder
 from slamreplay.batch.loop import looked_back
 from slamreplay.batch.task import LogTask
@@ -27,6 +27,7 @@ class BatchEnd:
         logs: asked for.
         kept: of them, done by an earlier run.
         states: how many of them have which verdict, by its state.
+        gates: how many of them the gate passed, failed or skipped; empty without a gate.
         failed: place and line of those that failed, in the order they were asked for.
         megabytes: of the logs done now.
         seconds: that it took.
@@ -35,13 +36,10 @@ class BatchEnd:
     logs: int
     kept: int
     states: Mapping[str, int]
+    gates: Mapping[str, int]
     failed: tuple[tuple[str, str], ...]
     megabytes: float
     seconds: float
-
-
-def _silent(_line: str) -> None:
-    pass
 
 
 def run_batch(
@@ -51,7 +49,7 @@ def run_batch(
     *,
     again_failed: bool = False,
     progress: Callable[[str, float], None] | None = None,
-    tell: Callable[[str], None] = _silent,
+    tell: Tell = silent,
 ) -> BatchEnd:
     """Look back on every log that is not in the folder yet, and keep each as it is done.
 
@@ -88,16 +86,20 @@ def run_batch(
                 told[result.key] = fate_of(result)
                 say(told, result.key)
         compact(target, tell)
-    states = Counter(fate.state for fate in told.values() if fate.state is not None)
     failed = [(task.source.log, told[task.key].error) for task in tasks]
     return BatchEnd(
         logs=len(tasks),
         kept=kept,
-        states=dict(sorted(states.items())),
+        states=_counted(fate.state for fate in told.values()),
+        gates=_counted(fate.gate for fate in told.values()),
         failed=tuple((log, line) for log, line in failed if line is not None),
         megabytes=sum(size_of(task) for task in todo) / _MB,
         seconds=time.monotonic() - begun,
     )
+
+
+def _counted(words: Iterable[str | None]) -> dict[str, int]:
+    return dict(sorted(Counter(word for word in words if word is not None).items()))
 
 
 def size_of(task: LogTask) -> int:
@@ -130,6 +132,7 @@ class _Telling:
             ("failed", sum(fate.error is not None for fate in told.values())),
             ("lost", sum("lost" in (fate.state or "") for fate in told.values())),
             ("changed", sum("changed" in (fate.state or "") for fate in told.values())),
+            ("gate failed", sum(fate.gate == "failed" for fate in told.values())),
         ):
             parts += [f"{count} {word}"] if count else []
         self._progress(", ".join(parts), self._done / self._all)
