@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import pkgutil
 import platform
+import re
 import signal
 import sys
 from collections.abc import Callable, Iterator, Mapping
@@ -24,6 +25,8 @@ if TYPE_CHECKING:
 _CONNECT_S, _FIRST_WORKER_S = 10.0, 60.0
 #: How long is enough for saying goodbye, s.
 _CLOSE_S = 10.0
+#: Checked by us, for a client of dask that was refused its address cannot even be closed.
+_ADDRESS = re.compile(r"((tcp|tls|ws|wss|ucx)://)?([^\s:/\[\]]+|\[[0-9a-fA-F:.]+\]):\d{1,5}/?")
 _NUMBER = "slamreplay.version:__version__"
 
 #: For workers of our own. What they hold is small: a log's memory is that of the program, which
@@ -75,6 +78,11 @@ class Workers:
                 "--workers and --memory-limit are for workers of this machine",
                 hint="those of a --scheduler are started with their own",
             )
+        if self.scheduler is not None and _ADDRESS.fullmatch(self.scheduler) is None:
+            raise UsageError(
+                f"'{self.scheduler}' is no address of a scheduler",
+                hint="--scheduler tcp://HOST:8786",
+            )
         if self.memory_limit is not None:
             _bytes(self.memory_limit)
         return self
@@ -95,7 +103,6 @@ def connected(workers: Workers, scratch: Path) -> Iterator[Client]:
 
     Raises:
         ClusterError: nobody answers at the address, or somebody with other versions.
-        UsageError: the address is none.
     """
     import dask
     from distributed import Client
@@ -177,11 +184,7 @@ def _reached(address: str, patience_s: float) -> Client:
 
     try:
         client = Client(address, timeout=patience_s, set_as_default=False)
-    except ValueError as error:
-        raise UsageError(
-            f"'{address}' is no address of a scheduler", hint="--scheduler tcp://HOST:8786"
-        ) from error
-    except OSError as error:
+    except (OSError, ValueError) as error:
         raise ClusterError(
             f"no scheduler answers at {address} within {patience_s:g} s",
             hint="start one with `dask scheduler`, and `dask worker ADDRESS` beside it",
