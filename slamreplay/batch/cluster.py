@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 
 #: How long a scheduler is looked for, and how long a worker of it is waited for, s.
 _CONNECT_S, _FIRST_WORKER_S = 10.0, 60.0
+#: How often workers of this machine are started.
+_STARTS = 3
 #: How long is enough for saying goodbye, s.
 _CLOSE_S = 10.0
 #: Checked by us, for a client of dask that was refused its address cannot even be closed.
@@ -112,7 +114,7 @@ def connected(workers: Workers, scratch: Path) -> Iterator[Client]:
         if workers.scheduler is None:
             ends.enter_context(dask.config.set(_LOCAL))
             with _interrupts_later():
-                cluster = _local(workers, scratch)
+                cluster = _started(workers, scratch)
                 ends.callback(_close, cluster)
             client = Client(cluster, set_as_default=False)
         else:
@@ -141,6 +143,20 @@ def kept_connected() -> Iterator[Connect]:
             yield held[0]
 
         yield connect
+
+
+def _started(workers: Workers, scratch: Path) -> LocalCluster:
+    """Workers of this machine; one that dies while it starts fails them all, so try again."""
+    for _ in range(_STARTS - 1):
+        with suppress(RuntimeError):
+            return _local(workers, scratch)
+    try:
+        return _local(workers, scratch)
+    except RuntimeError as error:
+        raise ClusterError(
+            f"its workers do not start: {error}",
+            hint="do they die for lack of memory? --workers 1, or a larger --memory-limit",
+        ) from error
 
 
 def _local(workers: Workers, scratch: Path) -> LocalCluster:

@@ -31,6 +31,7 @@ class BatchEnd:
         failed: place and line of those that failed, in the order they were asked for.
         megabytes: of the logs done now.
         seconds: that it took.
+        page: of all logs that the folder has.
     """
 
     logs: int
@@ -40,6 +41,7 @@ class BatchEnd:
     failed: tuple[tuple[str, str], ...]
     megabytes: float
     seconds: float
+    page: Path
 
 
 def run_batch(
@@ -67,6 +69,8 @@ def run_batch(
         OutputError: the folder is somebody else's, in use, or cannot be written.
         ClusterError: the cluster cannot be used, or went away for good.
     """
+    from slamreplay.fleet.page.writer import write_fleet_page
+
     begun = time.monotonic()
     tasks = list({task.key: task for task in reversed(tasks)}.values())[::-1]
     with batch_folder(target) as scratch:
@@ -86,6 +90,7 @@ def run_batch(
                 told[result.key] = fate_of(result)
                 say(told, result.key)
         compact(target, tell)
+        page = write_fleet_page(target, warn=tell)
     failed = [(task.source.log, told[task.key].error) for task in tasks]
     return BatchEnd(
         logs=len(tasks),
@@ -95,6 +100,7 @@ def run_batch(
         failed=tuple((log, line) for log, line in failed if line is not None),
         megabytes=sum(size_of(task) for task in todo) / _MB,
         seconds=time.monotonic() - begun,
+        page=page,
     )
 
 

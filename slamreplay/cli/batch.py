@@ -109,7 +109,7 @@ def _batch(
         say_json(_as_json(end, output))
     else:
         _show(end)
-        say_path(output)
+        say_path(end.page)
     if len(end.failed) == end.logs:
         complain(f"slamreplay: none of the {end.logs} logs could be looked back on")
         raise typer.Exit(_UNREADABLE)
@@ -132,6 +132,7 @@ def read_demands(recipe: Path) -> Demands:
 def _as_json(end: BatchEnd, output: Path) -> dict[str, object]:
     return {
         "output": str(output),
+        "page": str(end.page),
         "logs": end.logs,
         "kept": end.kept,
         "states": dict(end.states),
@@ -155,4 +156,6 @@ def _show(end: BatchEnd) -> None:
     for log, line in end.failed[:_MOST_FAILED]:
         say(("! ", "bad"), line if log in line else f"{log}: {line}")
     if len(end.failed) > _MOST_FAILED:
-        say(f"and {len(end.failed) - _MOST_FAILED} more that failed, see the table logs")
+        say(f"  and {len(end.failed) - _MOST_FAILED} more that failed, see the table logs")
+    if end.failed:
+        say("  they stay so; --again-failed tries them again")

@@ -83,7 +83,7 @@ def of_its_own(folder, target, logs, kills, chance):
     while True:
         if client is None:
             client, runs = start(*command), runs + 1
-        end = time.monotonic() + chance.uniform(1.0, 12.0)
+        end = time.monotonic() + chance.uniform(1.0, 7.0)
         while client.poll() is None and time.monotonic() < end:
             time.sleep(0.02)
         if client.poll() is not None or sum(killed.values()) >= kills:
