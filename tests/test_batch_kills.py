@@ -1,15 +1,10 @@
 """Workers, clients and schedulers that are killed: nothing is lost, and nothing is there twice."""
 
 import json
-import os
-import signal
-import socket
-import subprocess
-import sys
 from contextlib import ExitStack
-from pathlib import Path
 
 import pytest
+from batch_cluster import Cluster
 from batch_folders import (
     check_whole,
     committed,
@@ -25,9 +20,9 @@ from batch_folders import (
 
 @pytest.fixture(scope="module")
 def place(tmp_path_factory, logs_in):
-    """Six logs, and one that is none."""
+    """Four logs, and one that is none."""
     folder = tmp_path_factory.mktemp("logs")
-    for robot in range(6):
+    for robot in range(4):
         write_tiny_log(logs_in(folder), f"robot_{robot}.mcap", robot)
     (folder / "torn.mcap").write_bytes(b"not a log")
     return folder
@@ -51,57 +46,10 @@ def test_a_killed_worker_and_a_killed_client_lose_nothing(place, tmp_path):
 
     assert (code, err) == (0, "")
     told = json.loads(out)
-    assert (told["logs"], told["kept"]) == (7, kept)
-    assert told["states"] == {"insufficient_data": 6}
+    assert (told["logs"], told["kept"]) == (5, kept)
+    assert told["states"] == {"insufficient_data": 4}
     assert [one["log"].rpartition("/")[2] for one in told["failed"]] == ["torn.mcap"]
-    check_whole(target, done=6, failed=1)
-
-
-class Cluster:
-    """A scheduler and workers as an operator starts them; every log is looked back on at once."""
-
-    def __init__(self, folder):
-        with socket.socket() as probe:
-            probe.bind(("127.0.0.1", 0))
-            self.port = probe.getsockname()[1]
-        self.address = f"tcp://127.0.0.1:{self.port}"
-        self.folder = folder
-        self.programs = []
-
-    def begin(self, workers=1):
-        self.scheduler = self._start(
-            "scheduler",
-            "--port",
-            self.port,
-            "--host",
-            "127.0.0.1",
-            "--no-dashboard",
-        )
-        preload = Path(__file__).with_name("batch_stand_in.py")
-        for _ in range(workers):
-            self._start(
-                "worker", self.address, "--nthreads", 1, "--preload", preload, "--no-dashboard",
-                "--local-directory", self.folder, "--no-nanny",
-            )  # fmt: skip
-
-    def _start(self, kind, *arguments):
-        command = [sys.executable, "-m", "distributed.cli.dask_" + kind, *map(str, arguments)]
-        # One death is enough to suspect a log, and the dead are not waited for for half a minute.
-        settings = {"SCHEDULER__ALLOWED_FAILURES": "0", "COMM__TIMEOUTS__CONNECT": "2s"}
-        with (self.folder / f"{kind}.txt").open("a") as told:
-            program = subprocess.Popen(
-                command, stdout=told, stderr=told, start_new_session=True,
-                cwd=self.folder,
-                env=os.environ | {f"DASK_DISTRIBUTED__{k}": v for k, v in settings.items()},
-            )  # fmt: skip
-        self.programs.append(program)
-        return program
-
-    def end(self):
-        for program in self.programs:
-            if program.poll() is None:
-                os.killpg(program.pid, signal.SIGKILL)
-            program.wait()
+    check_whole(target, done=4, failed=1)
 
 
 @pytest.fixture
@@ -125,7 +73,7 @@ def test_a_killed_scheduler_loses_nothing_and_a_log_that_kills_workers_stops_no_
     cluster.begin()
     program = start(*command)
     wait_until(lambda: committed(target) >= 1)
-    kill(cluster.scheduler.pid)
+    cluster.kill(cluster.scheduler)
     cluster.end()
 
     cluster.begin(workers=4)  # three of them die

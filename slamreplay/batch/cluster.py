@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import pkgutil
 import platform
+import re
 import signal
 import sys
 from collections.abc import Callable, Iterator, Mapping
@@ -22,8 +23,12 @@ if TYPE_CHECKING:
 
 #: How long a scheduler is looked for, and how long a worker of it is waited for, s.
 _CONNECT_S, _FIRST_WORKER_S = 10.0, 60.0
+#: How often workers of this machine are started.
+_STARTS = 3
 #: How long is enough for saying goodbye, s.
 _CLOSE_S = 10.0
+#: Checked by us, for a client of dask that was refused its address cannot even be closed.
+_ADDRESS = re.compile(r"((tcp|tls|ws|wss|ucx)://)?([^\s:/\[\]]+|\[[0-9a-fA-F:.]+\]):\d{1,5}/?")
 _NUMBER = "slamreplay.version:__version__"
 
 #: For workers of our own. What they hold is small: a log's memory is that of the program, which
@@ -38,8 +43,9 @@ _LOCAL = {
     "distributed.scheduler.allowed-failures": 0,
     "distributed.scheduler.worker-ttl": None,
     "distributed.admin.low-level-log-length": 100,
-    "distributed.admin.large-graph-warning-threshold": "1GiB",
 }
+#: A map that is sent along is as large as it is.
+_CLIENT = {"distributed.admin.large-graph-warning-threshold": "1GiB"}
 
 
 class ClusterError(SlamreplayError):
@@ -74,6 +80,11 @@ class Workers:
                 "--workers and --memory-limit are for workers of this machine",
                 hint="those of a --scheduler are started with their own",
             )
+        if self.scheduler is not None and _ADDRESS.fullmatch(self.scheduler) is None:
+            raise UsageError(
+                f"'{self.scheduler}' is no address of a scheduler",
+                hint="--scheduler tcp://HOST:8786",
+            )
         if self.memory_limit is not None:
             _bytes(self.memory_limit)
         return self
@@ -94,14 +105,16 @@ def connected(workers: Workers, scratch: Path) -> Iterator[Client]:
 
     Raises:
         ClusterError: nobody answers at the address, or somebody with other versions.
-        UsageError: the address is none.
     """
+    import dask
     from distributed import Client
 
     with _quiet(), ExitStack() as ends:
+        ends.enter_context(dask.config.set(_CLIENT))
         if workers.scheduler is None:
+            ends.enter_context(dask.config.set(_LOCAL))
             with _interrupts_later():
-                cluster = _local(workers, scratch)
+                cluster = _started(workers, scratch)
                 ends.callback(_close, cluster)
             client = Client(cluster, set_as_default=False)
         else:
@@ -132,25 +145,37 @@ def kept_connected() -> Iterator[Connect]:
         yield connect
 
 
+def _started(workers: Workers, scratch: Path) -> LocalCluster:
+    """Workers of this machine; one that dies while it starts fails them all, so try again."""
+    for _ in range(_STARTS - 1):
+        with suppress(RuntimeError):
+            return _local(workers, scratch)
+    try:
+        return _local(workers, scratch)
+    except RuntimeError as error:
+        raise ClusterError(
+            f"its workers do not start: {error}",
+            hint="do they die for lack of memory? --workers 1, or a larger --memory-limit",
+        ) from error
+
+
 def _local(workers: Workers, scratch: Path) -> LocalCluster:
-    import dask
     from distributed import LocalCluster
 
     limit = {} if workers.memory_limit is None else {"memory_limit": workers.memory_limit}
-    with dask.config.set(_LOCAL):
-        return LocalCluster(
-            n_workers=workers.count,
-            threads_per_worker=1,
-            processes=True,
-            dashboard_address=None,
-            # Its scheduler listens all the same, and two batches on one machine want one port.
-            scheduler_kwargs={"dashboard_address": "localhost:0"},
-            silence_logs=logging.CRITICAL + 1,
-            local_directory=str(scratch),
-            env={"NUMBA_NUM_THREADS": "1"},
-            preload=["slamreplay.batch.own_worker"],
-            **limit,
-        )
+    return LocalCluster(
+        n_workers=workers.count,
+        threads_per_worker=1,
+        processes=True,
+        dashboard_address=None,
+        # Its scheduler listens all the same, and two batches on one machine want one port.
+        scheduler_kwargs={"dashboard_address": "localhost:0"},
+        silence_logs=logging.CRITICAL + 1,
+        local_directory=str(scratch),
+        env={"NUMBA_NUM_THREADS": "1"},
+        preload=["slamreplay.batch.own_worker"],
+        **limit,
+    )
 
 
 @contextmanager
@@ -175,11 +200,7 @@ def _reached(address: str, patience_s: float) -> Client:
 
     try:
         client = Client(address, timeout=patience_s, set_as_default=False)
-    except ValueError as error:
-        raise UsageError(
-            f"'{address}' is no address of a scheduler", hint="--scheduler tcp://HOST:8786"
-        ) from error
-    except OSError as error:
+    except (OSError, ValueError) as error:
         raise ClusterError(
             f"no scheduler answers at {address} within {patience_s:g} s",
             hint="start one with `dask scheduler`, and `dask worker ADDRESS` beside it",

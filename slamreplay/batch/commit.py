@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -18,6 +18,12 @@ if TYPE_CHECKING:
 
 _MAP_MARKER = "map.yaml"
 
+Tell = Callable[[str], None]
+
+
+def silent(_line: str) -> None:
+    """Tell nobody."""
+
 
 @dataclass(frozen=True)
 class Fate:
@@ -26,18 +32,21 @@ class Fate:
     Attributes:
         state: of its verdict; None of one that failed.
         error: why it failed, in one line; None of one that did not.
+        gate: passed, failed or skipped; None without a gate.
     """
 
     state: str | None
     error: str | None
+    gate: str | None
 
 
-def commit_result(target: Path, result: LogResult) -> None:
+def commit_result(target: Path, result: LogResult, tell: Tell = silent) -> None:
     """Keep a result. Its rows come last: a log without them is done again, one with them is whole.
 
     Args:
         target: folder of the batch.
         result: of a log, failed ones included.
+        tell: told in a line what of the tables turns out to be damaged.
 
     Raises:
         OutputError: the place cannot be written.
@@ -49,12 +58,12 @@ def commit_result(target: Path, result: LogResult) -> None:
         place = target / map_folder(row["map_version"])
         if not (place / _MAP_MARKER).exists():
             _write(place, result.map_files, _MAP_MARKER)
-    commit(target, result.tables)
+    commit(target, result.tables, tell)
 
 
-def fates(target: Path) -> dict[str, Fate]:
-    """What became of every log that the folder has, by key."""
-    return _fates(read(target, "logs"))
+def fates(target: Path, tell: Tell = silent) -> dict[str, Fate]:
+    """What became of every log that the folder has, by key; `tell` as of `commit_result`."""
+    return _fates(read(target, "logs", tell))
 
 
 def fate_of(result: LogResult) -> Fate:
@@ -63,8 +72,8 @@ def fate_of(result: LogResult) -> Fate:
 
 
 def _fates(logs: pa.Table) -> dict[str, Fate]:
-    columns = (logs.column(name).to_pylist() for name in ("key", "state", "error"))
-    return {key: Fate(state, error) for key, state, error in zip(*columns, strict=True)}
+    columns = (logs.column(name).to_pylist() for name in ("key", "state", "error", "gate"))
+    return {key: Fate(*told) for key, *told in zip(*columns, strict=True)}
 
 
 def _write(folder: Path, files: Mapping[str, bytes], marker: str) -> None:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 from slamreplay.batch.addresses import shown
@@ -40,6 +41,26 @@ def task_of(
     return LogTask(key, source, cause, demands, dict(storage or {}), named)
 
 
+def tasks_of(
+    sources: Sequence[LogSource],
+    *,
+    cause: bool = True,
+    demands: Demands | None = None,
+    storage: Mapping[str, object] | None = None,
+) -> list[LogTask]:
+    """The tasks of many logs, as of `task_of`; those of one map share one copy of it."""
+    storage = dict(storage or {})
+    read: dict[tuple[str | None, str | None], Mapping[str, bytes]] = {}
+    tasks = []
+    for source in sources:
+        place = source.map, source.topics
+        if place not in read:
+            read[place] = named_files(source, storage)
+        key = key_of(source, cause=cause, demands=demands, named=read[place])
+        tasks.append(LogTask(key, source, cause, demands, storage, read[place]))
+    return tasks
+
+
 def key_of(
     source: LogSource,
     *,
@@ -62,9 +83,14 @@ def key_of(
         "labels": sorted(source.labels.items()),
         "cause": cause,
         "demands": None if demands is None else _in_order(asdict(demands)),
-        "named": sorted((n, hashlib.sha256(c).hexdigest()) for n, c in (named or {}).items()),
+        "named": sorted((n, _digest(c)) for n, c in (named or {}).items()),
     }
     return hashlib.sha256(json.dumps(told, sort_keys=True).encode()).hexdigest()[:32]
+
+
+@lru_cache(maxsize=8)
+def _digest(content: bytes) -> str:
+    return hashlib.sha256(content).hexdigest()
 
 
 def _in_order(demands: dict[str, object]) -> dict[str, object]:

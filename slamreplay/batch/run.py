@@ -4,20 +4,18 @@ from __future__ import annotations
 
 import time
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 
 from slamreplay.batch.cluster import Workers
-from slamreplay.batch.commit import Fate, commit_result, fate_of, fates
+from slamreplay.batch.commit import Fate, Tell, commit_result, fate_of, fates, silent
 from slamreplay.batch.folder import batch_folder
 from slamreplay.batch.loop import looked_back
 from slamreplay.batch.task import LogTask
 from slamreplay.fleet.store import compact
 
-#: Rows come as a folder per log; so many of those become one.
-_COMPACT_EVERY = 100
 _MB = 1e6
 
 
@@ -29,17 +27,21 @@ class BatchEnd:
         logs: asked for.
         kept: of them, done by an earlier run.
         states: how many of them have which verdict, by its state.
+        gates: how many of them the gate passed, failed or skipped; empty without a gate.
         failed: place and line of those that failed, in the order they were asked for.
         megabytes: of the logs done now.
         seconds: that it took.
+        page: of all logs that the folder has.
     """
 
     logs: int
     kept: int
     states: Mapping[str, int]
+    gates: Mapping[str, int]
     failed: tuple[tuple[str, str], ...]
     megabytes: float
     seconds: float
+    page: Path
 
 
 def run_batch(
@@ -49,6 +51,7 @@ def run_batch(
     *,
     again_failed: bool = False,
     progress: Callable[[str, float], None] | None = None,
+    tell: Tell = silent,
 ) -> BatchEnd:
     """Look back on every log that is not in the folder yet, and keep each as it is done.
 
@@ -60,16 +63,18 @@ def run_batch(
         workers: who does it.
         again_failed: try those again that failed before.
         progress: told how many are done, and the share done.
+        tell: told in a line what of the folder turned out to be damaged; its logs are done again.
 
     Raises:
         OutputError: the folder is somebody else's, in use, or cannot be written.
         ClusterError: the cluster cannot be used, or went away for good.
     """
+    from slamreplay.fleet.page.writer import write_fleet_page
+
     begun = time.monotonic()
     tasks = list({task.key: task for task in reversed(tasks)}.values())[::-1]
     with batch_folder(target) as scratch:
-        compact(target)  # also clears what one that was killed left
-        before = fates(target)
+        before = fates(target, tell)
         told = {
             task.key: before[task.key]
             for task in tasks
@@ -80,23 +85,27 @@ def run_batch(
         say = _Telling(todo, len(tasks), progress)
         say(told)
         with closing(looked_back(todo, workers, scratch)) as results:
-            for n, result in enumerate(results, start=1):
-                commit_result(target, result)
+            for result in results:
+                commit_result(target, result, tell)
                 told[result.key] = fate_of(result)
                 say(told, result.key)
-                if n % _COMPACT_EVERY == 0:
-                    compact(target)
-        compact(target)
-    states = Counter(fate.state for fate in told.values() if fate.state is not None)
+        compact(target, tell)
+        page = write_fleet_page(target, warn=tell)
     failed = [(task.source.log, told[task.key].error) for task in tasks]
     return BatchEnd(
         logs=len(tasks),
         kept=kept,
-        states=dict(sorted(states.items())),
+        states=_counted(fate.state for fate in told.values()),
+        gates=_counted(fate.gate for fate in told.values()),
         failed=tuple((log, line) for log, line in failed if line is not None),
         megabytes=sum(size_of(task) for task in todo) / _MB,
         seconds=time.monotonic() - begun,
+        page=page,
     )
+
+
+def _counted(words: Iterable[str | None]) -> dict[str, int]:
+    return dict(sorted(Counter(word for word in words if word is not None).items()))
 
 
 def size_of(task: LogTask) -> int:
@@ -129,6 +138,7 @@ class _Telling:
             ("failed", sum(fate.error is not None for fate in told.values())),
             ("lost", sum("lost" in (fate.state or "") for fate in told.values())),
             ("changed", sum("changed" in (fate.state or "") for fate in told.values())),
+            ("gate failed", sum(fate.gate == "failed" for fate in told.values())),
         ):
             parts += [f"{count} {word}"] if count else []
         self._progress(", ".join(parts), self._done / self._all)

@@ -21,6 +21,7 @@ from slamreplay.errors import SlamreplayError, UsageError
 if TYPE_CHECKING:
     import pyarrow as pa
 
+    from slamreplay.bundle.run import Run
     from slamreplay.bundle.view import Bundle
     from slamreplay.evidence.result import Postmortem
 
@@ -97,8 +98,10 @@ def _judged(task: LogTask, folder: Path, spent: Callable[[], Cost]) -> LogResult
     from slamreplay.report.build import build
     from slamreplay.report.writer import write_report
 
-    post = postmortem(_evidence(task, folder), cause=task.cause)
+    bundle = _evidence(task, folder)
+    post = postmortem(bundle, _runs(task, bundle), cause=task.cause)
     write_report(post, folder / "report")
+    gate = _gate(task, post, folder / "report")
     tables = dict(
         rows_of(
             post,
@@ -108,7 +111,7 @@ def _judged(task: LogTask, folder: Path, spent: Callable[[], Cost]) -> LogResult
             content=_content(post),
             bytes=_bytes_of(task),
             labels=task.source.labels,
-            gate=None,
+            gate=gate,
             report_folder=report_folder(task),
         )
     )
@@ -134,6 +137,31 @@ def _evidence(task: LogTask, folder: Path) -> Bundle:
     if options != IngestOptions():
         raise UsageError("a bundle takes no map, topics or robot: it was ingested already")
     return Bundle.open(logs[0])
+
+
+def _runs(task: LogTask, bundle: Bundle) -> list[Run]:
+    """Those that the gate's limits are about."""
+    if task.demands is None:
+        return []
+    from slamreplay.gate.gated import runs_of
+
+    return runs_of(task.demands, bundle, workers=1)
+
+
+def _gate(task: LogTask, post: Postmortem, report: Path) -> str | None:
+    """What the gate says, in a word; the file beside the report says it all."""
+    if task.demands is None:
+        return None
+    from slamreplay.gate.gated import gated
+    from slamreplay.gate.measuring import measures_of
+    from slamreplay.gate.outcome import GateResult
+    from slamreplay.gate.result_file import gate_json
+
+    log, measures = task.source.log, measures_of(post)
+    found = gated(post, task.demands, log, measures=measures, cause=task.cause)
+    result = GateResult(task.demands.question, "", (found,))
+    (report / "gate.json").write_bytes(gate_json(result, {log: measures}).encode())
+    return found.status
 
 
 def _content(post: Postmortem) -> str:

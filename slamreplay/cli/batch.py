@@ -9,13 +9,15 @@ import typer
 
 from slamreplay.cli.options import Json
 from slamreplay.cli.terminal import complain, say, say_json, say_path
+from slamreplay.errors import UsageError
 
 if TYPE_CHECKING:
     from slamreplay.batch.run import BatchEnd
+    from slamreplay.gate.rules import Demands
 
 #: So many failed logs are told with their line; all of them stand in the tables.
 _MOST_FAILED = 10
-_INTERRUPTED = 130
+_UNREADABLE, _INTERRUPTED = 2, 130
 
 Places = Annotated[
     list[str],
@@ -27,6 +29,17 @@ Places = Annotated[
 Output = Annotated[
     Path,
     typer.Option("-o", "--output", metavar="DIR", help="Where reports, tables and the page go."),
+]
+Maps = Annotated[
+    str | None,
+    typer.Option("--maps", metavar="CSV", help="Which logs were driven on which map, with labels."),
+]
+Recipe = Annotated[
+    Path | None, typer.Option("--recipe", metavar="YAML", help="Hold each log against this gate.")
+]
+Storage = Annotated[
+    list[str] | None,
+    typer.Option("--storage", metavar="KEY=VALUE", help="Option of fsspec for addresses."),
 ]
 Scheduler = Annotated[
     str | None,
@@ -60,24 +73,35 @@ def register(app: typer.Typer) -> None:
 def _batch(
     places: Places,
     output: Output,
+    maps: Maps = None,
+    recipe: Recipe = None,
     scheduler: Scheduler = None,
     workers: Count = None,
     memory_limit: MemoryLimit = None,
     cause: Cause = True,
     again_failed: AgainFailed = False,
+    storage: Storage = None,
     as_json: Json = False,
 ) -> None:
     from slamreplay.batch.cluster import Workers
-    from slamreplay.batch.keys import task_of
+    from slamreplay.batch.keys import tasks_of
+    from slamreplay.batch.maps_table import read_maps_table
     from slamreplay.batch.run import run_batch
     from slamreplay.batch.sources import sources_of
+    from slamreplay.batch.stores import storage_options
     from slamreplay.cli.progress import progress_bar
 
     who = Workers(workers, memory_limit, scheduler).checked()
+    demands = None if recipe is None else read_demands(recipe)
+    options = storage_options(storage or ())
     try:
-        tasks = [task_of(source, cause=cause) for source in sources_of(places, tell=complain)]
+        table = None if maps is None else read_maps_table(maps, options)
+        sources = sources_of(places, table, options, tell=complain)
+        tasks = tasks_of(sources, cause=cause, demands=demands, storage=options)
         with progress_bar("looking back") as progress:
-            end = run_batch(tasks, output, who, again_failed=again_failed, progress=progress)
+            end = run_batch(
+                tasks, output, who, again_failed=again_failed, progress=progress, tell=complain
+            )
     except KeyboardInterrupt:
         complain(f"stopped; what is done is kept in {output}: the same command again goes on")
         raise typer.Exit(_INTERRUPTED) from None
@@ -85,15 +109,34 @@ def _batch(
         say_json(_as_json(end, output))
     else:
         _show(end)
-        say_path(output)
+        say_path(end.page)
+    if len(end.failed) == end.logs:
+        complain(f"slamreplay: none of the {end.logs} logs could be looked back on")
+        raise typer.Exit(_UNREADABLE)
+
+
+def read_demands(recipe: Path) -> Demands:
+    """The demands of a gate's recipe.
+
+    Raises:
+        UsageError: as of `read_recipe`, or it is another kind of recipe.
+    """
+    from slamreplay.recipes import GateRecipe, read_recipe
+
+    read = read_recipe(recipe)
+    if not isinstance(read, GateRecipe):
+        raise UsageError("is no recipe of a gate", where=recipe, hint="see recipes/ci-gate")
+    return read.demands
 
 
 def _as_json(end: BatchEnd, output: Path) -> dict[str, object]:
     return {
         "output": str(output),
+        "page": str(end.page),
         "logs": end.logs,
         "kept": end.kept,
         "states": dict(end.states),
+        "gates": dict(end.gates),
         "failed": [{"log": log, "error": line} for log, line in end.failed],
         "done_mb": round(end.megabytes, 3),
         "seconds": round(end.seconds, 3),
@@ -105,10 +148,14 @@ def _show(end: BatchEnd) -> None:
     counts = [f"{count} {state}" for state, count in end.states.items()]
     counts += [f"{len(end.failed)} failed"] if end.failed else []
     say(f"{end.logs} logs: {', '.join(counts)}")
+    if end.gates:
+        say(f"gate: {', '.join(f'{count} {word}' for word, count in end.gates.items())}")
     kept = f", {end.kept} were there already" if end.kept else ""
     speed = f", {3600 * now / end.seconds:.0f} logs an hour" if now else ""
-    say(f"{now} done in {end.seconds:.0f} s ({end.megabytes:.0f} MB{speed}){kept}")
+    say(f"{now} done in {end.seconds:.0f} s ({end.megabytes:.3g} MB{speed}){kept}")
     for log, line in end.failed[:_MOST_FAILED]:
         say(("! ", "bad"), line if log in line else f"{log}: {line}")
     if len(end.failed) > _MOST_FAILED:
-        say(f"and {len(end.failed) - _MOST_FAILED} more that failed, see the table logs")
+        say(f"  and {len(end.failed) - _MOST_FAILED} more that failed, see the table logs")
+    if end.failed:
+        say("  they stay so; --again-failed tries them again")
