@@ -130,11 +130,11 @@ def test_custom_data_is_read_as_text_and_no_further(tmp_path):
 def test_the_table_holds_against_the_log_and_the_namespace_fills_in(tmp_path):
     path = _write(tmp_path / "a.mcap", {"site": "n", "robot_id": "7"})
     (source,) = sources_of([str(path)])
-    assert labels_of(source, [path]) == {"site": "n", "robot": "7", "robot_id": "7"}
+    assert labels_of(source, path) == {"site": "n", "robot": "7", "robot_id": "7"}
     said = replace(source, labels={"vehicle": "9"}, robot="/tb3")
-    assert labels_of(said, [path])["robot"] == "9"
+    assert labels_of(said, path)["robot"] == "9"
     alone = replace(source, robot="/tb3")
-    assert labels_of(alone, [SAMPLES / "healthy_short.bag"])["robot"] == "tb3"
+    assert labels_of(alone, SAMPLES / "healthy_short.bag")["robot"] == "tb3"
 
 
 def test_the_command_takes_labels_and_refuses_what_are_none(tmp_path, monkeypatch, capsys):

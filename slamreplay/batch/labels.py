@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 
 from slamreplay.batch.task import LogSource
 from slamreplay.ingest.labels import log_labels, with_meanings
 
 
-def labels_of(source: LogSource, paths: Sequence[Path]) -> dict[str, str]:
+def labels_of(source: LogSource, log: Path | None) -> dict[str, str]:
     """All labels by name; `site`, `robot` and `software` are what the fleet's columns show.
 
     The table holds against the log. The namespace by which one robot was chosen of several names it
@@ -17,10 +16,10 @@ def labels_of(source: LogSource, paths: Sequence[Path]) -> dict[str, str]:
 
     Args:
         source: the log.
-        paths: where it lies now, as of `fetch`.
+        log: where it lies now, as of `fetch.fetched`; None where it cannot be asked.
     """
     said = with_meanings(source.labels)
-    own = log_labels(paths[0]) if paths else {}
+    own = {} if log is None else log_labels(log)
     found = {**own, **said}
     if source.robot and not found.get("robot"):
         found["robot"] = source.robot.strip("/")
