@@ -1,8 +1,8 @@
 """Is a log on this machine all there, or is somebody still writing or copying it?
 
 Told by what the formats themselves put at their end. What has no end to be seen (a CARMEN text, a
-database without its metadata.yaml) is for the caller to watch standing still, by `standing`; so is
-a log that a robot never closed, after a longer while.
+database without its metadata.yaml) is for the caller to watch standing still; so is a log that a
+robot never closed, for a longer while.
 """
 
 from __future__ import annotations
@@ -69,22 +69,6 @@ def is_complete(path: Path) -> Completeness:
         return Completeness("no", "it is gone")
     except OSError as error:
         return Completeness("no", f"cannot read: {error.strerror or 'the system does not say why'}")
-
-
-def standing(path: Path) -> tuple[tuple[str, int, int], ...]:
-    """Name, size and time of the last change of each file of a log: equal while nobody writes.
-
-    Compare two of them on a clock of your own: the times of a share are those of another machine.
-    """
-    found = []
-    beside = (path, path.with_name(path.name + WAL), path.with_name(f"{path.name}-journal"))
-    for file in sorted(path.rglob("*")) if path.is_dir() else beside:
-        try:
-            about = file.stat()
-        except OSError:
-            continue  # gone meanwhile, which the next look will see
-        found.append((file.name, about.st_size, about.st_mtime_ns))
-    return tuple(found)
 
 
 def is_temporary(name: str) -> bool:

@@ -44,7 +44,7 @@ def fetch(
     if log is not None:
         for file in source.files:
             _check_local(file)
-        return [log]
+        return [fetched(source, folder)]
     need = sum(file.size or 0 for file in source.files)
     room = shutil.disk_usage(folder).free
     if need > room:
@@ -56,7 +56,12 @@ def fetch(
         target = folder / _inside(source.folder) / _inside(file.name)
         target.parent.mkdir(parents=True, exist_ok=True)
         _copy(file, target, storage, wait)
-    return [folder / _inside(source.folder or source.files[0].name)]
+    return [fetched(source, folder)]
+
+
+def fetched(source: LogSource, folder: Path) -> Path:
+    """Where a log is once `fetch` was given that folder."""
+    return local_log(source) or folder / _inside(source.folder or source.files[0].name)
 
 
 def local_log(source: LogSource) -> Path | None:

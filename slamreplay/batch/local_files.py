@@ -14,13 +14,13 @@ from slamreplay.errors import LogError
 #: A file up to this size is hashed as a whole, B.
 WHOLE = 1 << 20
 #: What is hashed of a larger one: its first and last bytes, and pieces spread between them, B.
-_END, _PIECE, _PIECES = 1 << 16, 1 << 12, 32
+_END, _PIECE, _PIECES = 1 << 15, 1 << 12, 16
 
 
 def fingerprint(path: Path) -> str:
     """What changes with a file's content, and stays when it is only touched, copied or moved.
 
-    Of a file of more than 1 MiB: SHA-256 over its size, its first and last 64 KiB and 32 pieces
+    Of a file of more than 1 MiB: SHA-256 over its size, its first and last 32 KiB and 16 pieces
     of 4 KiB at equal distances. The containers of logs say what they hold in their first or last
     bytes (bag header, MCAP summary, SQLite change counter, CRC of gzip and bzip2), so one that was
     written to differs there; what somebody changes by hand elsewhere, with the same size, may not.
@@ -38,7 +38,7 @@ def fingerprint(path: Path) -> str:
 @lru_cache(maxsize=1 << 16)
 def _fingerprint(path: Path, size: int, mtime_ns: int, inode: int) -> str:  # noqa: ARG001 - kept by
     digest = hashlib.sha256(f"{size}\n".encode())
-    with path.open("rb") as stream:
+    with path.open("rb", buffering=0) as stream:
         if size <= WHOLE:
             digest.update(stream.read(WHOLE + 1))
         else:

@@ -48,6 +48,12 @@ def _simulate(
     samples: Annotated[
         bool, typer.Option("--samples", help="Make all sample logs anew, in the folder -o.")
     ] = False,
+    labels: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--label", metavar="NAME=TEXT", help="Of the log: site=north, robot=amr-07; repeatable."
+        ),
+    ] = None,
     as_json: Json = False,
 ) -> None:
     from slamreplay.cli.progress import progress_bar
@@ -59,6 +65,9 @@ def _simulate(
             "give either a SCENARIO (and a seed) or --samples",
             hint=f"scenarios: {', '.join(SCENARIOS)}",
         )
+    if samples and labels:
+        raise UsageError("sample logs take no --label")
+    named = _labels(labels or [])
     with progress_bar("simulating") as progress:
         from slamreplay.simulate.pipeline import simulate, write_samples
 
@@ -68,8 +77,24 @@ def _simulate(
             from slamreplay.simulate.scenarios import scenario as scenario_of
 
             seed = scenario_of(scenario).seed if seed is None else seed
-            simulate(scenario, output, seed=seed)
+            simulate(scenario, output, seed=seed, labels=named)
     if as_json:
-        say_json({"scenario": scenario, "seed": seed, "log": str(output)}, indent=None)
+        said = {"scenario": scenario, "seed": seed, "log": str(output)}
+        say_json({**said, "labels": named} if named else said, indent=None)
     else:
         say_path(output)
+
+
+def _labels(given: list[str]) -> dict[str, str]:
+    from slamreplay.ingest.labels import is_label
+
+    found: dict[str, str] = {}
+    for text in given:
+        name, equals, value = text.partition("=")
+        if not equals or not is_label(name, value):
+            hint = "as in --label site=north; a name is of a-z, 0-9 and _"
+            raise UsageError("--label takes NAME=TEXT", where=repr(text)[:60], hint=hint)
+        if name in found:
+            raise UsageError(f"--label {name} is given twice")
+        found[name] = value
+    return found

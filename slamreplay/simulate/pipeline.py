@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from types import MappingProxyType
 
 from slamreplay.bundle.atomic import write_file
 from slamreplay.errors import OutputError
@@ -11,23 +12,31 @@ from slamreplay.simulate.recording import record
 from slamreplay.simulate.samples import SAMPLES, readme
 from slamreplay.simulate.scenarios import scenario as scenario_of
 from slamreplay.simulate.topics import records
-from slamreplay.simulate.writer import write_log
+from slamreplay.simulate.writer import check_labels, write_log
 
 
-def simulate(scenario: str, target: Path, *, seed: int | None = None) -> None:
+def simulate(
+    scenario: str,
+    target: Path,
+    *,
+    seed: int | None = None,
+    labels: Mapping[str, str] = MappingProxyType({}),
+) -> None:
     """Play a scenario and write its log; the same scenario and seed give the same bytes.
 
     Args:
         scenario: a key of `slamreplay.simulate.SCENARIOS`.
         target: the log; `.mcap`, `.db3`, `.bag`, or no suffix for a rosbag2 folder.
         seed: of every random number; by default the scenario's own.
+        labels: site, robot, software and the like, kept in the log.
 
     Raises:
         UsageError: there is no such scenario.
-        OutputError: `target` cannot be written or has another suffix.
+        OutputError: `target` cannot be written, has another suffix or holds no labels.
     """
+    check_labels(target, labels)
     recording = record(scenario_of(scenario), seed)
-    write_log(target, lambda messages: records(recording, messages))
+    write_log(target, lambda messages: records(recording, messages), labels=labels)
 
 
 def write_samples(folder: Path, *, progress: Callable[[str, float], None] | None = None) -> None:

@@ -6,10 +6,11 @@ under a temporary name and renamed, so that it is whole or absent.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from types import MappingProxyType
 from typing import Any
 
 from rosbags.interfaces import (
@@ -24,6 +25,7 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from slamreplay.bundle.atomic import atomic_folder, check_target
 from slamreplay.errors import OutputError
+from slamreplay.ingest.labels import RECORD as LABELS_RECORD
 from slamreplay.messages.definitions import DEFINITIONS, LATER_DEFINITIONS
 from slamreplay.simulate.messages import Messages
 from slamreplay.simulate.topics import LATCHED, Record
@@ -33,23 +35,31 @@ FOLDER_MARKER = "metadata.yaml"
 #: Larger chunks than recorders use: a sample log compresses better so.
 _CHUNK_BYTES = 4 << 20
 _LIBRARY = "slamreplay simulate"
+_NO_LABELS: Mapping[str, str] = MappingProxyType({})
 #: rosbag2 writes policies of its quality of service as numbers up to version 8 of its metadata and
 #: as words since; each release before Jazzy reads numbers only. By a record without a version the
 #: later ones know that it is numbers they find (rosbag2_storage_mcap, mcap_storage.cpp).
 _BAG_METADATA = {"serialized_metadata": ""}
 
 
-def write_log(target: Path, make: Callable[[Messages], Sequence[Record]]) -> None:
+def write_log(
+    target: Path,
+    make: Callable[[Messages], Sequence[Record]],
+    *,
+    labels: Mapping[str, str] = _NO_LABELS,
+) -> None:
     """Write a log; its suffix says which kind.
 
     Args:
         target: `.mcap` (ROS 2, zstd chunks), `.db3` (ROS 2, SQLite), `.bag` (ROS 1), or no suffix
             for a rosbag2 folder with an mcap file.
         make: gives the records, sorted by time, from the message classes of that kind.
+        labels: site, robot and the like: a metadata record of MCAP, `custom_data` of rosbag2.
 
     Raises:
-        OutputError: another suffix, or a place that cannot be written.
+        OutputError: another suffix, labels in a ROS 1 bag, or a place that cannot be written.
     """
+    check_labels(target, labels)
     if target.suffix not in _FILES:
         if target.suffix:
             raise OutputError(
@@ -61,7 +71,7 @@ def write_log(target: Path, make: Callable[[Messages], Sequence[Record]]) -> Non
         store = type_store(2)
         log = make(Messages(store, 2))
         with atomic_folder(target, marker=FOLDER_MARKER) as work, _scratch(target) as scratch:
-            _write_rosbag2(scratch / target.name, store, log, "mcap")
+            _write_rosbag2(scratch / target.name, store, log, "mcap", labels)
             for file in sorted((scratch / target.name).iterdir()):
                 file.rename(work / file.name)
         return
@@ -72,9 +82,20 @@ def write_log(target: Path, make: Callable[[Messages], Sequence[Record]]) -> Non
     try:
         with _scratch(target) as scratch:
             log = make(Messages(store, ros_version))
-            write(scratch / target.stem, store, log).replace(target)
+            write(scratch / target.stem, store, log, labels).replace(target)
     except OSError as error:
         raise OutputError(f"cannot write: {error.strerror or error}", where=target) from error
+
+
+def check_labels(target: Path, labels: Mapping[str, str]) -> None:
+    """Refuse labels for a log that cannot hold them.
+
+    Raises:
+        OutputError: it is a ROS 1 bag.
+    """
+    if labels and target.suffix == ".bag":
+        raise OutputError("a ROS 1 bag holds no labels", where=target,
+                          hint="write .mcap, .db3 or a rosbag2 folder")  # fmt: skip
 
 
 def type_store(ros_version: int) -> Any:
@@ -95,8 +116,8 @@ def _scratch(target: Path) -> Iterator[Path]:
         yield Path(folder)
 
 
-def _write_mcap(path: Path, store: Any, log: Iterable[Record]) -> Path:
-    write_mcap(path, store, log, library=_LIBRARY)
+def _write_mcap(path: Path, store: Any, log: Iterable[Record], labels: Mapping[str, str]) -> Path:
+    write_mcap(path, store, log, library=_LIBRARY, labels=labels)
     return path
 
 
@@ -107,6 +128,7 @@ def write_mcap(
     *,
     library: str,
     latched: Collection[str] | None = None,
+    labels: Mapping[str, str] = _NO_LABELS,
 ) -> None:
     """One mcap file of profile ros2, chunk by chunk.
 
@@ -115,6 +137,7 @@ def write_mcap(
         store: the type store that the messages' classes are from.
         log: sorted by log time.
         library: who writes it.
+        labels: of the log, written as one metadata record.
         latched: topics whose last message late subscribers get; then every topic's quality of
             service is told, as rosbag2 does, and a player offers it.
     """
@@ -125,6 +148,8 @@ def write_mcap(
         writer.start(profile="ros2", library=library)
         if latched is not None:
             writer.add_metadata("rosbag2", _BAG_METADATA)
+        if labels:
+            writer.add_metadata(LABELS_RECORD, dict(sorted(labels.items())))
         schemas: dict[str, int] = {}
         channels: dict[str, int] = {}
         for record in log:
@@ -153,18 +178,22 @@ def _offered(is_latched: bool) -> dict[str, str]:
     return {"offered_qos_profiles": dump_qos_v8(_qos(latched=is_latched))}
 
 
-def _write_db3(path: Path, store: Any, log: Sequence[Record]) -> Path:
-    _write_rosbag2(path, store, log, "sqlite3")
+def _write_db3(path: Path, store: Any, log: Sequence[Record], labels: Mapping[str, str]) -> Path:
+    _write_rosbag2(path, store, log, "sqlite3", labels)
     return path / f"{path.name}.db3"
 
 
-def _write_rosbag2(path: Path, store: Any, log: Sequence[Record], storage: str) -> None:
+def _write_rosbag2(
+    path: Path, store: Any, log: Sequence[Record], storage: str, labels: Mapping[str, str]
+) -> None:
     from rosbags.rosbag2.enums import CompressionFormat, CompressionMode, StoragePlugin
     from rosbags.rosbag2.writer import Writer
 
     writer = Writer(path, version=9, storage_plugin=StoragePlugin[storage.upper()])
     if storage == "mcap":
         writer.set_compression(CompressionMode.STORAGE, CompressionFormat.ZSTD)
+    for name, value in sorted(labels.items()):
+        writer.set_custom_data(name, value)
     with writer:
         connections: dict[str, Any] = {}
         for record in log:
@@ -180,7 +209,7 @@ def _write_rosbag2(path: Path, store: Any, log: Sequence[Record], storage: str) 
             writer.write(connections[record.topic], record.t_log_ns, data)
 
 
-def _write_bag(path: Path, store: Any, log: Sequence[Record]) -> Path:
+def _write_bag(path: Path, store: Any, log: Sequence[Record], _labels: Mapping[str, str]) -> Path:
     from rosbags.rosbag1.writer import Writer
 
     writer = Writer(path)
