@@ -10,7 +10,7 @@ from slamreplay.fleet.page import words
 from slamreplay.fleet.page.bars import Piece, in_words, pieces
 from slamreplay.fleet.page.headline import difference, measure_words
 from slamreplay.report.cells import Cell, Table, table
-from slamreplay.report.phrases import NOT_KNOWN, short
+from slamreplay.report.phrases import NOT_KNOWN
 
 #: Rows of one table.
 MOST_ROWS = {"robot": 25, "site": 30, "map_version": 25, "software": 12, "day": 42}
@@ -67,7 +67,7 @@ def group_table(what: Dimension, groups: Sequence[Group]) -> GroupTable:
     order: Callable[[Group], tuple[object, ...]] = (
         _newest_last if what in ("day", "software") else _worst_last
     )
-    ordered = sorted(groups, key=order, reverse=True)  # type: ignore[arg-type]
+    ordered = sorted(groups, key=order, reverse=True)
     shown = ordered[: MOST_ROWS[what]]
     left = len(ordered) - len(shown)
     one, many = NOUNS[what]
@@ -78,7 +78,7 @@ def group_table(what: Dimension, groups: Sequence[Group]) -> GroupTable:
 
 
 def _worst_last(group: Group) -> tuple[float, float, int, str]:
-    """By how often it surely gets lost, not by how often it did: one log of one is no worst robot."""
+    """By how often it gets lost at least: a robot lost in its only log is not the worst."""
     low = group.lost.low or 0.0
     return (low, group.changed.low or 0.0, group.logs, group.name or "")
 
@@ -100,7 +100,7 @@ def _row(what: Dimension, group: Group) -> Row:
             Number(f"{group.logs:,}", failed, str(group.logs)),
             _share(group.lost),
             Number(
-                short(rate.value) if rate.value is not None else NOT_KNOWN,
+                words.two_digits(rate.value) if rate.value is not None else NOT_KNOWN,
                 words.interval_of(rate),
                 _by(rate.value),
             ),

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from slamreplay.fleet.answers import Answers, Area, Step
 from slamreplay.fleet.page import words
 from slamreplay.fleet.page.remap import needed
-from slamreplay.report.phrases import short
 from slamreplay.verdict.words import square_metres
 
 
@@ -103,8 +102,8 @@ def _rate(answers: Answers) -> Fact:
             "unknown", "", f"How often robots get lost per km. {detail}", "#robots", "See whose"
         )
     return Fact(
-        f"{short(rate.value)} per km",
-        "robots became lost so often",
+        f"{words.two_digits(rate.value)} per km",
+        "is how often robots become lost",
         detail[:1].upper() + detail[1:],
         "#robots",
         "See whose",
@@ -124,10 +123,11 @@ def _software(steps: Sequence[Step]) -> Fact:
         return Fact("none", "", detail, "#software", "See the numbers")
     step = next((one for one in worse if one.measure == "lost"), worse[0])
     return Fact(
-        f"{words.share_of(step.was)} to {words.share_of(step.now)}",
-        f"of logs {measure_words(step.measure)} since {step.after}",
-        f"Was so with {step.before}; {difference(step)}, over {words.count(step.sites, 'site')} "
-        f"and {words.count(step.robots, 'robot')}.",
+        words.share_of(step.now),
+        f"of logs {measure_words(step.measure)} with {step.after}; {words.share_of(step.was)} with "
+        f"{step.before}",
+        f"The difference is {difference(step)}, over {words.count(step.sites, 'site')} and "
+        f"{words.count(step.robots, 'robot')}.",
         "#software",
         "See the numbers",
         alarming=True,
