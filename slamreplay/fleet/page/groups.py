@@ -126,8 +126,9 @@ def _by(value: float | None) -> str:
 
 
 def step_table(steps: Sequence[Step]) -> Table:
-    """What changed from one software version to the next: what got worse first."""
+    """What changed from one software version to the next: what got worse and is newest first."""
     rank = {"worse": 0, "better": 1, "not told apart": 2}
+    newest_first = steps[::-1]
     rows = [
         (
             f"{step.before} to {step.after}",
@@ -138,7 +139,7 @@ def step_table(steps: Sequence[Step]) -> Table:
             step.verdict,
             Cell(words.count(step.sites, "site"), words.count(step.robots, "robot")),
         )
-        for step in sorted(steps, key=lambda one: rank[one.verdict])
+        for step in sorted(newest_first, key=lambda one: rank[one.verdict])
     ]
     head = ("change", "measure", "before", "after", "difference", "verdict", "over")
     return table(head, rows, "the query's answer")

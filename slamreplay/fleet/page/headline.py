@@ -68,7 +68,9 @@ def _of_maps(areas: Sequence[Area], lost: int) -> str:
 
 
 def _site(area: Area) -> str:
-    return "a site not told" if area.site is None else f"site {area.site}"
+    if area.site is None:
+        return "a site not told"
+    return area.site if area.site.lower().startswith("site") else f"site {area.site}"
 
 
 def _areas(areas: Sequence[Area]) -> Fact:
@@ -121,7 +123,7 @@ def _software(steps: Sequence[Step]) -> Fact:
         pairs = len({(step.before, step.after) for step in steps})
         detail = f"Software versions that got worse, of {words.count(pairs, 'change')} of version."
         return Fact("none", "", detail, "#software", "See the numbers")
-    step = next((one for one in worse if one.measure == "lost"), worse[0])
+    step = newest(worse)
     return Fact(
         words.share_of(step.now),
         f"of logs {measure_words(step.measure)} with {step.after}; {words.share_of(step.was)} with "
@@ -132,6 +134,12 @@ def _software(steps: Sequence[Step]) -> Fact:
         "See the numbers",
         alarming=True,
     )
+
+
+def newest(steps: Sequence[Step]) -> Step:
+    """Of the last change of version the one that counts lost logs, if any does."""
+    last = [step for step in steps if step.after == steps[-1].after]
+    return next((step for step in last if step.measure == "lost"), last[0])
 
 
 def difference(step: Step) -> str:

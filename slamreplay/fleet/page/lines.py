@@ -33,7 +33,7 @@ def fleet_lines(answers: Answers) -> list[str]:
                  "No aisle needs re-mapping.")  # fmt: skip
     worse = [step for step in answers.steps if step.verdict == "worse"]
     if worse:
-        step = next((one for one in worse if one.measure == "lost"), worse[0])
+        step = headline.newest(worse)
         lines.append(
             f"Software {step.after} is worse than {step.before}: "
             f"{words.share_of(step.was)} to {words.share_of(step.now)} of logs "

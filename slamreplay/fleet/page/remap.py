@@ -13,6 +13,8 @@ from slamreplay.fleet.page.frame import Frame, around, frame_of, nice
 from slamreplay.fleet.page.heat import Shade, blocks_of, heat
 from slamreplay.fleet.page.links import Link, Reports
 from slamreplay.fleet.page.map_image import MapImage
+from slamreplay.fleet.page.words import Box
+from slamreplay.fleet.schema import PLACE_M
 from slamreplay.report.cells import Cell, Table, table
 from slamreplay.verdict.words import square_metres
 
@@ -108,9 +110,8 @@ def _cell(link: Link) -> Cell:
 def _card(
     area: Area, places: MapPlaces | None, image: tuple[str, MapImage] | None, reports: Reports
 ) -> Card:
-    frame = frame_of(
-        around(area.box_m, margin_m=_MARGIN_M, aspect=_ASPECT, least_m=_LEAST_M), axes=False
-    )
+    piece = around(area.box_m, margin_m=_MARGIN_M, aspect=_ASPECT, least_m=_LEAST_M)
+    frame = frame_of(piece, axes=False)
     x0, y0, x1, y1 = area.box_m
     length = nice(frame.clip[2] / frame.metre / 8.0)
     title = f"{words.label(area.site)}, {words.place(area.box_m)}"
@@ -135,17 +136,19 @@ def _card(
         None if image is None else frame_of(image[1].box_m, axes=False),
         "" if image is None else image[0],
         (x0, y0, x1 - x0, y1 - y0),
-        _shades(places),
+        _shades(places, piece),
         (12.0, round(length * frame.metre, 2), f"{length:g} m"),
         f"Piece of the map of {words.label(area.site)} with the area that has aged: {title}.",
     )
 
 
-def _shades(places: MapPlaces | None) -> tuple[Shade, ...]:
-    if places is None or not len(places.col):
+def _shades(places: MapPlaces | None, piece: Box) -> tuple[Shade, ...]:
+    if places is None:
         return ()
-    blocks = blocks_of(places.col, places.row)
-    looks, against = blocks.greatest(places.looks), blocks.greatest(places.against)
+    x, y = (places.col + 0.5) * PLACE_M, (places.row + 0.5) * PLACE_M
+    near = (x > piece[0]) & (x < piece[2]) & (y > piece[1]) & (y < piece[3])
+    blocks = blocks_of(places.col[near], places.row[near])
+    looks, against = blocks.greatest(places.looks[near]), blocks.greatest(places.against[near])
     share = np.divide(against, looks, out=np.zeros_like(looks), where=looks > 0)
     classes = [""] * (len(_LEVELS) + 1)
     return heat(blocks, share, bounds=_LEVELS, classes=classes, texts=[""] * len(share)).shades
