@@ -146,7 +146,12 @@ def difference(step: Step) -> str:
     """How far apart two versions are, in points."""
     if step.low is None or step.high is None:
         return "the difference is not known"
-    return f"{100.0 * step.low:+.0f} to {100.0 * step.high:+.0f} points with 95 % confidence"
+    return f"{_points(step.low)} to {_points(step.high)} points with 95 % confidence"
+
+
+def _points(difference: float) -> str:
+    points = 100.0 * difference
+    return f"{points:+.1f}" if abs(points) < 9.95 else f"{points:+.0f}"
 
 
 def measure_words(measure: str) -> str:

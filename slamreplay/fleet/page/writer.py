@@ -7,6 +7,7 @@ from pathlib import Path
 
 from slamreplay.bundle.atomic import write_file
 from slamreplay.errors import MapError
+from slamreplay.fleet.answering import answers as answers_of
 from slamreplay.fleet.answers import Answers
 from slamreplay.fleet.page.html import fleet_html
 from slamreplay.fleet.page.map_image import MapImage, map_image
@@ -17,13 +18,13 @@ PAGE_FILE = "fleet.html"
 
 
 def write_fleet_page(
-    folder: Path, answers: Answers, *, warn: Callable[[str], None] | None = None
+    folder: Path, answers: Answers | None = None, *, warn: Callable[[str], None] | None = None
 ) -> Path:
     """Write fleet.html into a batch's folder; it is whole, or stays as it was.
 
     Args:
         folder: of the batch; its `maps` are drawn, and its reports linked.
-        answers: of its tables.
+        answers: of its tables; None to find them.
         warn: told in one line of each map that cannot be read.
 
     Returns:
@@ -32,6 +33,8 @@ def write_fleet_page(
     Raises:
         OutputError: the place cannot be written.
     """
+    if answers is None:
+        answers = answers_of(folder)
     images = _images(folder, versions_drawn(answers), warn or (lambda _line: None))
     target = folder / PAGE_FILE
     write_file(target, fleet_html(view_of(answers, images, {})).encode())
