@@ -15,9 +15,9 @@ from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.parquet as pq
 
 from slamreplay.fleet.schema import TABLES, arrow_schema
+from slamreplay.fleet.store import commit
 from slamreplay.maps.grid import OccupancyGrid
 from slamreplay.maps.map_server import map_files
 
@@ -45,14 +45,14 @@ class Fleet:
         """As a batch leaves them, a part for each half of the logs."""
         keys = self.tables["logs"]["key"].to_numpy(zero_copy_only=False).astype(str)
         half = keys[len(keys) // 2]
-        for name, one in self.tables.items():
-            first = one["key"].to_numpy(zero_copy_only=False).astype(str) < half
-            for part, rows in (("part-1", first), ("part-2", ~first)):
-                target = folder / "tables" / part
-                target.mkdir(parents=True, exist_ok=True)
-                pq.write_table(one.filter(pa.array(rows)), target / f"{name}.parquet")
+        for is_first in (True, False):
+            part = {}
+            for name, one in self.tables.items():
+                rows = one["key"].to_numpy(zero_copy_only=False).astype(str) < half
+                part[name] = one.filter(pa.array(rows == is_first))
+            commit(folder, part)
         for version, grid in self.maps.items():
-            target = folder / "maps" / version.removeprefix("sha256:")
+            target = folder / "maps" / version.removeprefix("sha256:")[:16]
             target.mkdir(parents=True, exist_ok=True)
             for name, data in map_files(grid, "map").items():
                 (target / name).write_bytes(data)
@@ -110,6 +110,7 @@ def fleet(
         ),
         "root_cause": [None] * n,
         "lost_s": times["lost"],
+        "lost_times": lost.astype(int),
         "changed_s": np.where(changed, 40.0, 0.0),
         "judged_s": times["here"],
         "max_error_m": np.where(lost, rng.uniform(0.8, 6.0, size=n), rng.uniform(0.02, 0.2, n)),
@@ -131,9 +132,9 @@ def fleet(
         "logs": logs,
         "intervals": _intervals(rng, logs, lost, changed),
         "findings": _findings(logs, lost, changed),
-        "regions": _regions(rng, logs, np.flatnonzero(changed)),
-        "stops": _stops(rng, logs, where),
-        "places": places,
+        "regions": _with_map(logs, _regions(rng, logs, np.flatnonzero(changed))),
+        "stops": _with_map(logs, _stops(rng, logs, where)),
+        "places": _with_map(logs, places),
         "costs": {"key": logs["key"], "cpu_s": [7.0] * n, "wall_s": [7.5] * n,
                   "peak_mb": [600.0] * n, "attempts": [1] * n},
     }  # fmt: skip
@@ -266,7 +267,7 @@ def _regions(rng, logs, which):
 
 
 def _stops(rng, logs, where):
-    out = {name: [] for name in TABLES["stops"]}
+    out = {name: [] for name in TABLES["stops"] if name != "map_version"}
     for k, count in enumerate(logs["stops"]):
         for _ in range(count or 0):
             row = (logs["key"][k], logs["end_ns"][k] - int(rng.integers(60)) * S,
@@ -275,6 +276,12 @@ def _stops(rng, logs, where):
             for name, value in zip(out, row, strict=True):
                 out[name].append(value)
     return out
+
+
+def _with_map(logs, columns):
+    """The columns of rows with that of their log's map."""
+    versions = dict(zip(logs["key"], logs["map_version"], strict=True))
+    return {**columns, "map_version": [versions[key] for key in columns["key"]]}
 
 
 def _arrow(name, columns, *, dropped):

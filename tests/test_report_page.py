@@ -4,13 +4,13 @@ import base64
 import hashlib
 import re
 from dataclasses import replace
-from html.parser import HTMLParser
 from importlib.resources import files
 from itertools import pairwise
 from urllib.parse import unquote
 
 import numpy as np
 import pytest
+from documents import Document
 from posts import bare_post, lost_post
 
 from slamreplay.audit.log_audit import LogAudit
@@ -35,37 +35,7 @@ from slamreplay.report.sections import sections
 from slamreplay.testing.synthetic import START_NS, synthetic_bundle
 
 S = 1_000_000_000
-VOID = frozenset({"meta", "source", "img", "br", "rect", "line", "path", "link", "input"})
 NOTHING = Scene((), None, None, np.zeros((3, 2)), (), ())
-
-
-class Document(HTMLParser):
-    """Every tag with its attributes and its depth, and the text of each heading."""
-
-    def __init__(self, text: str) -> None:
-        super().__init__()
-        self.text, self.tags, self.open, self.unclosed = text, [], [], []
-        self.feed(text)
-
-    def handle_starttag(self, tag, attrs):
-        self.tags.append((tag, dict(attrs), tuple(self.open)))
-        if tag not in VOID:
-            self.open.append(tag)
-
-    def handle_startendtag(self, tag, attrs):
-        self.tags.append((tag, dict(attrs), tuple(self.open)))
-
-    def handle_endtag(self, tag):
-        if tag in VOID:
-            return
-        if not self.open or self.open.pop() != tag:
-            self.unclosed.append(tag)
-
-    def all(self, *names):
-        return [attributes for tag, attributes, _ in self.tags if tag in names]
-
-    def ids(self):
-        return [a["id"] for _, a, _ in self.tags if "id" in a]
 
 
 @pytest.fixture(scope="module")

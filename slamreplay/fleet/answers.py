@@ -155,14 +155,17 @@ class Cause:
 class Spot:
     """A square of `SPOT_M` of a map in which robots get lost, the worst first.
 
+    Logs that came by are taken as independent: with few robots, look at `robots`. Squares that few
+    logs passed are none, so that one visit does not top the list.
+
     Attributes:
         box_m: x_min, y_min, x_max, y_max in the frame of the map.
         here_s: time of all robots there, by hindsight.
         lost_s: of it, lost.
         entered: times one became lost here.
-        lost: logs in which the robot was lost here, of those that came by.
-        robots: distinct ones that were lost here.
-        example: key of the log that was lost here longest.
+        lost: logs in which the robot became lost here, of those that came by.
+        robots: distinct ones that became lost here.
+        example: key of the log that was lost here longest, of those that became lost here.
     """
 
     site: str | None
@@ -304,7 +307,7 @@ class MapPlaces:
     """One map with what all logs say of its places, for a heat map; arrays are (N,), one per place.
 
     Attributes:
-        logs: judged against it.
+        logs: that ended in it.
         robots: distinct ones.
         first_day: of these logs; None where no clock tells.
         last_day: the same.
@@ -315,9 +318,9 @@ class MapPlaces:
         lost_s: of it, lost.
         entered: times one became lost there.
         passed: logs that came by.
-        lost_logs: of them, those in which the robot was lost there.
+        lost_logs: of them, those in which the robot was lost there, however it came to it.
         seen_m2: of the map that beams checked, greatest over logs.
-        looks: logs that looked there.
+        looks: logs with a verdict, and a clock, that looked there.
         against: of them, those that contradict the map there.
         persistence: of looks after the first that contradicts, the share that does, too; NaN where
             none contradicts or nobody came back.

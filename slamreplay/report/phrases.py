@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import re
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from slamreplay.evidence.result import Postmortem
 from slamreplay.evidence.words import STATES, confidence_text
 from slamreplay.geometry.times import NS_PER_S
-from slamreplay.verdict.reliability import Reliability
+
+if TYPE_CHECKING:
+    from slamreplay.evidence.result import Postmortem
+    from slamreplay.verdict.reliability import Reliability
 
 #: What stands in a cell for a number that is not known.
 NOT_KNOWN = "-"

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-from slamreplay.evidence.result import Postmortem
 from slamreplay.evidence.words import STATES
 from slamreplay.report.phrases import seconds, span
+
+if TYPE_CHECKING:
+    from slamreplay.evidence.result import Postmortem
 
 #: A texture for each state, as a path over a tile of 8 by 8: colours alone do not tell them apart.
 HATCHES = {

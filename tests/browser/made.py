@@ -1,4 +1,5 @@
-"""The reports that are opened: a lost robot, a changed aisle, a log without its map, a hostile one.
+"""The reports that are opened: a lost robot, a changed aisle, a log without its map, a hostile one;
+and the page of a fleet.
 
 The first comes from the command that users type, the others from the functions behind it.
 """
@@ -9,12 +10,14 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from fleet_tables import fleet
 
 from slamreplay.bundle.findings import Finding
 from slamreplay.bundle.manifest import Loss, Manifest, Source
 from slamreplay.bundle.schema import TABLES
 from slamreplay.bundle.tables import Table
 from slamreplay.bundle.view import Bundle
+from slamreplay.fleet.page.writer import write_fleet_page
 from slamreplay.ingest.options import IngestOptions
 from slamreplay.ingest.pipeline import ingest
 from slamreplay.postmortem import postmortem
@@ -46,6 +49,8 @@ def report(name: str, folder: Path) -> Path:
             [*program, str(log), "-o", str(target)], check=True, capture_output=True, cwd=ROOT
         )
         return target / "report.html"
+    if name == "fleet":
+        return write_fleet_page(fleet().write(target))
     if name == "hostile":
         post = postmortem(hostile_bundle())
         said = Finding("SR-DAT-002", "error", f"{HOSTILE}\ud800", START_NS, START_NS + 10**9)

@@ -6,9 +6,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from slamreplay.evidence.words import STATES
+from slamreplay.verdict.judgement import State
 
 #: In a bar from left to right, in a column from below: the worst first, what says nothing last.
-ORDER = (
+ORDER: tuple[State, ...] = (
     "lost",
     "lost_and_map_changed",
     "map_changed",
@@ -22,7 +23,7 @@ ORDER = (
 class Piece:
     """A part of a bar: from `start`, `size` long, both in per cent of the whole bar."""
 
-    state: str
+    state: State
     start: float
     size: float
     title: str
@@ -39,7 +40,7 @@ class Column:
     is_labelled: bool
 
 
-def pieces(counts: Mapping[str, int], whole: int | None = None) -> tuple[Piece, ...]:
+def pieces(counts: Mapping[State, int], whole: int | None = None) -> tuple[Piece, ...]:
     """The parts of a bar.
 
     Args:
@@ -59,13 +60,15 @@ def pieces(counts: Mapping[str, int], whole: int | None = None) -> tuple[Piece, 
     return tuple(out)
 
 
-def in_words(counts: Mapping[str, int]) -> str:
+def in_words(counts: Mapping[State, int]) -> str:
     """A bar as text."""
     told = [f"{STATES[s].name} {counts[s]:,}" for s in ORDER if counts.get(s, 0)]
     return ", ".join(told) or "no logs"
 
 
-def columns(days: Sequence[tuple[str, Mapping[str, int]]], labels: int = 10) -> tuple[Column, ...]:
+def columns(
+    days: Sequence[tuple[str, Mapping[State, int]]], labels: int = 10
+) -> tuple[Column, ...]:
     """A column for each day; the highest fills the height, and about so many have their label."""
     highest = max((sum(counts.values()) for _, counts in days), default=0)
     pitch, every = 100.0 / max(len(days), 1), -(-len(days) // labels)

@@ -10,7 +10,7 @@ from slamreplay.fleet.page import words
 from slamreplay.fleet.page.bars import Piece, in_words, pieces
 from slamreplay.fleet.page.headline import difference, measure_words
 from slamreplay.report.cells import Cell, Table, table
-from slamreplay.report.phrases import NOT_KNOWN, short
+from slamreplay.report.phrases import NOT_KNOWN
 
 #: Rows of one table.
 MOST_ROWS = {"robot": 25, "site": 30, "map_version": 25, "software": 12, "day": 42}
@@ -67,7 +67,7 @@ def group_table(what: Dimension, groups: Sequence[Group]) -> GroupTable:
     order: Callable[[Group], tuple[object, ...]] = (
         _newest_last if what in ("day", "software") else _worst_last
     )
-    ordered = sorted(groups, key=order, reverse=True)  # type: ignore[arg-type]
+    ordered = sorted(groups, key=order, reverse=True)
     shown = ordered[: MOST_ROWS[what]]
     left = len(ordered) - len(shown)
     one, many = NOUNS[what]
@@ -78,7 +78,7 @@ def group_table(what: Dimension, groups: Sequence[Group]) -> GroupTable:
 
 
 def _worst_last(group: Group) -> tuple[float, float, int, str]:
-    """By how often it surely gets lost, not by how often it did: one log of one is no worst robot."""
+    """By how often it gets lost at least: a robot lost in its only log is not the worst."""
     low = group.lost.low or 0.0
     return (low, group.changed.low or 0.0, group.logs, group.name or "")
 
@@ -100,7 +100,7 @@ def _row(what: Dimension, group: Group) -> Row:
             Number(f"{group.logs:,}", failed, str(group.logs)),
             _share(group.lost),
             Number(
-                short(rate.value) if rate.value is not None else NOT_KNOWN,
+                words.two_digits(rate.value) if rate.value is not None else NOT_KNOWN,
                 words.interval_of(rate),
                 _by(rate.value),
             ),
@@ -126,8 +126,9 @@ def _by(value: float | None) -> str:
 
 
 def step_table(steps: Sequence[Step]) -> Table:
-    """What changed from one software version to the next: what got worse first."""
+    """What changed from one software version to the next: what got worse and is newest first."""
     rank = {"worse": 0, "better": 1, "not told apart": 2}
+    newest_first = steps[::-1]
     rows = [
         (
             f"{step.before} to {step.after}",
@@ -138,7 +139,7 @@ def step_table(steps: Sequence[Step]) -> Table:
             step.verdict,
             Cell(words.count(step.sites, "site"), words.count(step.robots, "robot")),
         )
-        for step in sorted(steps, key=lambda one: rank[one.verdict])
+        for step in sorted(newest_first, key=lambda one: rank[one.verdict])
     ]
     head = ("change", "measure", "before", "after", "difference", "verdict", "over")
     return table(head, rows, "the query's answer")

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from slamreplay.fleet.answers import Answers, Area, Step
 from slamreplay.fleet.page import words
 from slamreplay.fleet.page.remap import needed
-from slamreplay.report.phrases import short
 from slamreplay.verdict.words import square_metres
 
 
@@ -69,7 +68,9 @@ def _of_maps(areas: Sequence[Area], lost: int) -> str:
 
 
 def _site(area: Area) -> str:
-    return "a site not told" if area.site is None else f"site {area.site}"
+    if area.site is None:
+        return "a site not told"
+    return area.site if area.site.lower().startswith("site") else f"site {area.site}"
 
 
 def _areas(areas: Sequence[Area]) -> Fact:
@@ -103,8 +104,8 @@ def _rate(answers: Answers) -> Fact:
             "unknown", "", f"How often robots get lost per km. {detail}", "#robots", "See whose"
         )
     return Fact(
-        f"{short(rate.value)} per km",
-        "robots became lost so often",
+        f"{words.two_digits(rate.value)} per km",
+        "is how often robots become lost",
         detail[:1].upper() + detail[1:],
         "#robots",
         "See whose",
@@ -122,23 +123,35 @@ def _software(steps: Sequence[Step]) -> Fact:
         pairs = len({(step.before, step.after) for step in steps})
         detail = f"Software versions that got worse, of {words.count(pairs, 'change')} of version."
         return Fact("none", "", detail, "#software", "See the numbers")
-    step = next((one for one in worse if one.measure == "lost"), worse[0])
+    step = newest(worse)
     return Fact(
-        f"{words.share_of(step.was)} to {words.share_of(step.now)}",
-        f"of logs {measure_words(step.measure)} since {step.after}",
-        f"Was so with {step.before}; {difference(step)}, over {words.count(step.sites, 'site')} "
-        f"and {words.count(step.robots, 'robot')}.",
+        words.share_of(step.now),
+        f"of logs {measure_words(step.measure)} with {step.after}; {words.share_of(step.was)} with "
+        f"{step.before}",
+        f"The difference is {difference(step)}, over {words.count(step.sites, 'site')} and "
+        f"{words.count(step.robots, 'robot')}.",
         "#software",
         "See the numbers",
         alarming=True,
     )
 
 
+def newest(steps: Sequence[Step]) -> Step:
+    """Of the last change of version the one that counts lost logs, if any does."""
+    last = [step for step in steps if step.after == steps[-1].after]
+    return next((step for step in last if step.measure == "lost"), last[0])
+
+
 def difference(step: Step) -> str:
     """How far apart two versions are, in points."""
     if step.low is None or step.high is None:
         return "the difference is not known"
-    return f"{100.0 * step.low:+.0f} to {100.0 * step.high:+.0f} points with 95 % confidence"
+    return f"{_points(step.low)} to {_points(step.high)} points with 95 % confidence"
+
+
+def _points(difference: float) -> str:
+    points = 100.0 * difference
+    return f"{points:+.1f}" if abs(points) < 9.95 else f"{points:+.0f}"
 
 
 def measure_words(measure: str) -> str:

@@ -71,7 +71,8 @@ class Blocks:
 
     def sum(self, values: NDArray) -> Array:
         """Over the places (M,) of each block."""
-        return np.bincount(self._of, np.asarray(values, dtype=np.float64), minlength=len(self.col))
+        weights = np.asarray(values, dtype=np.float64)
+        return np.bincount(self._of, weights, len(self.col)).astype(np.float64)
 
     def greatest(self, values: NDArray) -> Array:
         """Over the places (M,) of each block: of counts of logs, which may be the same logs."""

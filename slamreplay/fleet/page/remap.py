@@ -13,12 +13,14 @@ from slamreplay.fleet.page.frame import Frame, around, frame_of, nice
 from slamreplay.fleet.page.heat import Shade, blocks_of, heat
 from slamreplay.fleet.page.links import Link, Reports
 from slamreplay.fleet.page.map_image import MapImage
+from slamreplay.fleet.page.words import Box
+from slamreplay.fleet.schema import PLACE_M
 from slamreplay.report.cells import Cell, Table, table
 from slamreplay.verdict.words import square_metres
 
 #: So many are shown with a piece of their map.
 MOST_CARDS = 10
-_ASPECT, _MARGIN_M, _LEAST_M = 4.0 / 3.0, 3.0, 12.0
+_ASPECT, _MARGIN_M, _LEAST_M = 4.0 / 3.0, 5.0, 16.0
 _LEVELS = (0.1, 0.25, 0.5, 0.75)
 
 
@@ -35,6 +37,7 @@ class Card:
         why: the reason in a sentence.
         log: the latest one that says so.
         frame: of the piece.
+        whole: of all of the map, with the area somewhere in it; None where the map is not there.
         image: id of the map's image on the page, empty where the map is not there.
         box: x, y, width and height of the area, m.
         shades: what share of logs contradicts each place of it.
@@ -50,6 +53,7 @@ class Card:
     why: str
     log: Link
     frame: Frame
+    whole: Frame | None
     image: str
     box: tuple[float, float, float, float]
     shades: tuple[Shade, ...]
@@ -80,8 +84,8 @@ def cards(
 
 def rest(areas: Sequence[Area], reports: Reports) -> Table:
     """Areas as rows: those that had no room, that may still settle, or that did."""
-    head = ("advice", "site", "where", "area", "since", "logs, robots", "later looks", "lost nearby",
-            "latest log")  # fmt: skip
+    head = ("advice", "site", "where", "area", "since", "logs, robots", "later looks",
+            "lost nearby", "latest log")  # fmt: skip
     rows = [
         (
             area.advice,
@@ -106,18 +110,17 @@ def _cell(link: Link) -> Cell:
 def _card(
     area: Area, places: MapPlaces | None, image: tuple[str, MapImage] | None, reports: Reports
 ) -> Card:
-    frame = frame_of(
-        around(area.box_m, margin_m=_MARGIN_M, aspect=_ASPECT, least_m=_LEAST_M), axes=False
-    )
+    piece = around(area.box_m, margin_m=_MARGIN_M, aspect=_ASPECT, least_m=_LEAST_M)
+    frame = frame_of(piece, axes=False)
     x0, y0, x1, y1 = area.box_m
     length = nice(frame.clip[2] / frame.metre / 8.0)
     title = f"{words.label(area.site)}, {words.place(area.box_m)}"
+    lost = words.hours(area.lost_near_s / 3600.0)
     facts = (
         ("since", f"{words.day(area.first_day)}, last seen {words.day(area.last_day)}"),
         ("seen by", f"{words.count(area.logs, 'log')} of {words.count(area.robots, 'robot')}"),
         ("still so", _still(area)),
-        ("it costs", f"{words.hours(area.lost_near_s / 3600.0)} lost nearby, of "
-                     f"{words.hours(area.near_h)} that robots were there"),
+        ("it costs", f"{lost} lost nearby, of {words.hours(area.near_h)} that robots were there"),
         ("map", words.map_name(area.map_version)),
     )  # fmt: skip
     return Card(
@@ -125,24 +128,27 @@ def _card(
         square_metres(area.m2),
         words.day(area.first_day),
         f"{words.count(area.logs, 'log')} of {words.count(area.robots, 'robot')}, {_still(area)}; "
-        f"{words.hours(area.lost_near_s / 3600.0)} lost nearby",
+        f"{lost} lost nearby",
         facts,
         area.why,
         reports.of(area.example),
         frame,
+        None if image is None else frame_of(image[1].box_m, axes=False),
         "" if image is None else image[0],
         (x0, y0, x1 - x0, y1 - y0),
-        _shades(places),
+        _shades(places, piece),
         (12.0, round(length * frame.metre, 2), f"{length:g} m"),
         f"Piece of the map of {words.label(area.site)} with the area that has aged: {title}.",
     )
 
 
-def _shades(places: MapPlaces | None) -> tuple[Shade, ...]:
-    if places is None or not len(places.col):
+def _shades(places: MapPlaces | None, piece: Box) -> tuple[Shade, ...]:
+    if places is None:
         return ()
-    blocks = blocks_of(places.col, places.row)
-    looks, against = blocks.greatest(places.looks), blocks.greatest(places.against)
+    x, y = (places.col + 0.5) * PLACE_M, (places.row + 0.5) * PLACE_M
+    near = (x > piece[0]) & (x < piece[2]) & (y > piece[1]) & (y < piece[3])
+    blocks = blocks_of(places.col[near], places.row[near])
+    looks, against = blocks.greatest(places.looks[near]), blocks.greatest(places.against[near])
     share = np.divide(against, looks, out=np.zeros_like(looks), where=looks > 0)
     classes = [""] * (len(_LEVELS) + 1)
     return heat(blocks, share, bounds=_LEVELS, classes=classes, texts=[""] * len(share)).shades

@@ -16,7 +16,6 @@ class Section:
         title: its heading.
         short: its name in the table of contents.
         count: told beside it, 0 where nothing is counted.
-        template: where its text is.
         groups: index of its table in the view's `groups`; None of other sections.
     """
 
@@ -24,8 +23,12 @@ class Section:
     title: str
     short: str
     count: int = 0
-    template: str = ""
     groups: int | None = None
+
+    @property
+    def template(self) -> str:
+        """Where its text is."""
+        return f"parts/{self.anchor if self.groups is None else 'group'}.html.j2"
 
 
 def sections(view: FleetView) -> tuple[Section, ...]:
@@ -46,8 +49,7 @@ def sections(view: FleetView) -> tuple[Section, ...]:
     )
     grouped = {"robots": 0, "sites": 1, "versions": 2, "days": 3}
     return tuple(
-        Section(anchor, title, short, count, f"parts/{'group' if anchor in grouped else anchor}.html.j2",
-                grouped.get(anchor))
+        Section(anchor, title, short, count, grouped.get(anchor))
         for told, anchor, title, short, count in every
         if told
     )  # fmt: skip

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -135,7 +136,7 @@ def _traffic(places: Blocks, here: Array, at: Sequence[str]) -> Panel:
     edges = [words.hours(s / 3600.0) for s in (*bounds, most)]
     classes = [
         f"up to {edges[0]}",
-        *(f"{a} to {b}" for a, b in zip(edges, edges[1:], strict=False)),
+        *(f"{a} to {b}" for a, b in pairwise(edges)),
     ]
     texts = [f"{where}: {words.hours(s / 3600.0)}" for where, s in zip(at, here, strict=True)]
     return Panel(
@@ -186,7 +187,7 @@ def _highest(share: Array, texts: Sequence[str]) -> str:
 
 def _ranges(bounds: Sequence[float]) -> list[str]:
     edges = [f"{100.0 * b:g}" for b in bounds]
-    between = [f"{a} to {b} %" for a, b in zip(edges, edges[1:], strict=False)]
+    between = [f"{a} to {b} %" for a, b in pairwise(edges)]
     return [f"up to {edges[0]} %", *between, f"over {edges[-1]} %"]
 
 

@@ -19,6 +19,9 @@ from slamreplay.version import __version__
 
 #: Days of the trend; what is older is in the table of days, as far as that goes.
 _MOST_DAYS = 42
+#: Names of the queries that stand under the page's answers.
+QUERIES = ("areas", "picks", "places", "causes", "steps", "software", "robot", "site",
+           "map_version", "day", "gate", "failed")  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -133,7 +136,7 @@ def view_of(answers: Answers, images: Mapping[str, MapImage], sql: Mapping[str, 
         copies=logs.copies(answers.copies),
         remarks=answers.remarks,
         alike=f"{answers.alike:.1f}",
-        sql=sql,
+        sql={name: sql.get(name, "") for name in QUERIES},
     )
 
 

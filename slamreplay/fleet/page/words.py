@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from datetime import date
 
 from slamreplay.fleet.answers import Rate, Share
-from slamreplay.report.phrases import NOT_KNOWN, short
+from slamreplay.report.phrases import NOT_KNOWN
 
 Box = tuple[float, float, float, float]
 
@@ -61,13 +62,20 @@ def share_of(share: Share) -> str:
     return percent(share.value)
 
 
-def interval_of(value: Share | Rate, scale: float = 1.0) -> str:
+def interval_of(value: Share | Rate) -> str:
     """A 95 % interval in words, empty where it is not known."""
     if value.low is None or value.high is None:
         return ""
     if isinstance(value, Share):
         return f"{100.0 * value.low:.0f} to {100.0 * value.high:.0f} %"
-    return f"{short(scale * value.low)} to {short(scale * value.high)}"
+    return f"{two_digits(value.low)} to {two_digits(value.high)}"
+
+
+def two_digits(value: float) -> str:
+    """A number that is known no better, without a power of ten."""
+    if value == 0.0 or abs(value) >= 10.0:
+        return f"{value:,.0f}"
+    return f"{value:.{max(1 - math.floor(math.log10(abs(value))), 0)}f}"
 
 
 def hours(h: float) -> str:

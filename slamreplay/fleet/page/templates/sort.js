@@ -1,23 +1,24 @@
-// Tables sort by their columns: once from the highest, once more from the lowest. Without this
-// script they stand in the order of what is worst.
-const words = new Intl.Collator(undefined, { numeric: true });
+// Tables sort by their columns: numbers once from the highest, once more from the lowest, names the
+// other way round. Without this script they stand in the order of what is worst.
+const names = new Intl.Collator(undefined, { numeric: true });
+
+const isNumber = (cell) => cell.dataset.by !== undefined;
+const isKnown = (cell) => cell.dataset.by !== '';
 
 function compare(a, b) {
-  if (a === '' || b === '') return (a === '') - (b === ''); // what is not known stays below
-  const difference = Number(b) - Number(a);
-  return Number.isNaN(difference) ? words.compare(a, b) : difference;
+  if (isNumber(a)) return Number(a.dataset.by) - Number(b.dataset.by);
+  return names.compare(a.textContent, b.textContent);
 }
 
 function sort(table, head, column) {
-  const again = head.getAttribute('aria-sort') === 'descending';
-  for (const other of head.parentElement.children) other.removeAttribute('aria-sort');
-  head.setAttribute('aria-sort', again ? 'ascending' : 'descending');
-  const body = table.tBodies[0];
-  const value = (row) => row.children[column].dataset.by ?? row.children[column].textContent.trim();
-  const known = [...body.rows].filter((row) => value(row) !== '');
-  const unknown = [...body.rows].filter((row) => value(row) === '');
-  known.sort((a, b) => (again ? -1 : 1) * compare(value(a), value(b)));
-  body.append(...known, ...unknown);
+  const body = table.tBodies[0], rows = [...body.rows], first = rows[0].cells[column];
+  const before = head.getAttribute('aria-sort') ?? (isNumber(first) ? 'ascending' : 'descending');
+  const order = before === 'ascending' ? 'descending' : 'ascending';
+  for (const other of head.parentElement.cells) other.removeAttribute('aria-sort');
+  head.setAttribute('aria-sort', order);
+  const known = rows.filter((row) => isKnown(row.cells[column])); // what is not stays below
+  known.sort((a, b) => (order === 'ascending' ? 1 : -1) * compare(a.cells[column], b.cells[column]));
+  body.append(...known, ...rows.filter((row) => !known.includes(row)));
 }
 
 for (const table of document.querySelectorAll('table.sortable')) {

@@ -1,0 +1,344 @@
+"""Which parts of a map are no longer true, and whether that stays: what to map again.
+
+One log that contradicts the map may have met a pallet. What counts is what later logs saw there:
+places whose latest looks contradict the map are laid together to areas apart from those that were
+found right again, and each area is judged by the logs that looked at it, one after the other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from slamreplay.fleet.answers import NEAR_M, Advice, Area
+from slamreplay.fleet.cells import AGAINST_M2, Ints, Maps, Rows, starts
+from slamreplay.fleet.counted import Counted, Flags
+from slamreplay.fleet.gathered import AGAINST, HERE, LOST, Gathered, looks
+from slamreplay.fleet.in_use import InUse
+from slamreplay.fleet.schema import PLACE_M
+from slamreplay.geometry import se2
+
+if TYPE_CHECKING:
+    from slamreplay.fleet.snapshot import Snapshot
+
+#: A place is wrong now if half of so many latest looks say so: one look may miss it.
+LATEST_LOOKS = 3
+#: Places this far from each other, in rows or columns, are of one area: a gap of one is bridged.
+GAP = 2
+#: A log looked at an area if it saw so much of what others saw of it, and contradicts it with so
+#: much of what the most contradicted: another side of a pallet is less than its front.
+LOOK_SHARE, AGAINST_SHARE = 0.3, 0.2
+#: Smaller areas are legs of a table: no reason to do anything.
+LEAST_M2 = 0.1
+#: To map again takes so many logs that contradict, of two robots where two have looked: a laser
+#: that was knocked contradicts everything, but it is of one robot.
+LEAST_LOGS, LEAST_ROBOTS = 3, 2
+#: And so much of so many latest looks.
+RECENT, RECENT_SHARE = 5, 0.6
+#: So many looks in a row that find the map right: what stood there is gone.
+CLEARED = 2
+#: Regions within an area are of one kind if so many are.
+ONE_KIND = 2.0 / 3.0
+_S_PER_H = 3600.0
+
+
+@dataclass(frozen=True, eq=False)
+class Looks:
+    """Logs looking at places that one of them contradicts at least, by place and time: (N,) rows.
+
+    Attributes:
+        place: row of `codes`.
+        log: of the counted logs.
+        against: whether it contradicts the map there.
+        seen_m2: what it saw of the place.
+        contradicted_m2: what of that contradicts the map.
+        codes: of the places.
+    """
+
+    place: Ints
+    log: Ints
+    against: Flags
+    seen_m2: se2.Array
+    contradicted_m2: se2.Array
+    codes: Ints
+
+
+def time_order(logs: Counted) -> Ints:
+    """(N,) rank of each log by its start, then by its key."""
+    rank = np.empty(len(logs), dtype=np.int64)
+    rank[np.argsort(logs.start_ns, kind="stable")] = np.arange(len(logs))
+    return rank
+
+
+def looks_at_changes(now: Snapshot, logs: Counted, found: Gathered) -> Looks:
+    """Read the places again, those only that a log contradicts."""
+    maps = Maps(logs, found.maps)
+    codes = found.places.code[found.places.added[:, AGAINST] > 0]
+    held: list[Rows] = []
+    for rows in maps.rows(now, ("seen_m2", "contradicted_m2")):
+        at = np.minimum(np.searchsorted(codes, rows.code), max(0, len(codes) - 1))
+        there = codes[at] == rows.code if len(codes) else np.zeros(len(rows.code), dtype=bool)
+        held.append(rows.take(there & looks(rows, logs)[0]))
+    code = np.concatenate([np.empty(0, np.int64), *(rows.code for rows in held)])
+    log = np.concatenate([np.empty(0, np.int64), *(rows.log for rows in held)])
+    seen, contradicted = (
+        np.concatenate([np.empty(0), *(rows.numbers[name] for rows in held)])
+        for name in ("seen_m2", "contradicted_m2")
+    )
+    place = np.searchsorted(codes, code)
+    order = np.lexsort((time_order(logs)[log], place))
+    contradicted = contradicted[order]
+    return Looks(
+        place[order],
+        log[order],
+        contradicted >= AGAINST_M2,
+        seen[order],
+        contradicted,
+        codes,
+    )
+
+
+def areas(
+    now: Snapshot, logs: Counted, found: Gathered, seen: Looks, in_use: InUse
+) -> tuple[Area, ...]:
+    """All areas, those of maps in use first, then by advice, then by what mapping again would help.
+
+    That is m2 x persistence x hours of robots beside it, the persistence by Laplace's rule of
+    succession, (still + 1) / (visits + 2), so that one visit is not a hundred per cent.
+    """
+    if not len(seen.place):
+        return ()
+    index, col, row = found.places.split()
+    rows_of_codes = np.searchsorted(found.places.code, seen.codes)
+    where = np.column_stack([a[rows_of_codes] for a in (index, col, row)])
+    part = _together(where, _wrong_now(seen))
+    kinds = _Kinds(now, logs, found)
+    order = np.argsort(part, kind="stable")
+    first = starts(part[order])
+    by_area = np.split(order, first[1:])
+    # Looks by area and log: what one log saw of all places of the area.
+    rank = time_order(logs)
+    area = part[seen.place]
+    by = np.lexsort((rank[seen.log], area))
+    begins = np.union1d(starts(area[by]), starts(seen.log[by]))
+    sums = np.add.reduceat(
+        np.column_stack([seen.seen_m2, seen.contradicted_m2])[by], begins, axis=0
+    )
+    area, log = area[by][begins], seen.log[by][begins]
+    ends = np.searchsorted(area, np.arange(len(by_area) + 1))
+    answers = []
+    for k, places in enumerate(by_area):
+        mine = slice(int(ends[k]), int(ends[k + 1]))
+        course = _course(log[mine], sums[mine])
+        if course is None:
+            continue
+        map_index, cells = int(where[places[0], 0]), where[places, 1:]
+        answers.append(_area(logs, found, course, map_index, cells, kinds, in_use))
+    return tuple(sorted(answers, key=_order))
+
+
+def _wrong_now(seen: Looks) -> Flags:
+    """(P,) whether the latest looks at each place contradict the map, half of them at least."""
+    last = np.append(starts(seen.place)[1:], len(seen.place))
+    count, against = np.zeros(len(last)), np.zeros(len(last))
+    for back in range(1, LATEST_LOOKS + 1):
+        at = np.maximum(last - back, 0)
+        is_there = (last - back >= 0) & (seen.place[at] == np.arange(len(last)))
+        count += is_there
+        against += is_there & seen.against[at]
+    return np.asarray(2 * against >= count)
+
+
+def _together(where: Ints, wrong_now: Flags) -> Ints:
+    """(P,) number of the area of each place, places by map, column and row."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+    from scipy.spatial import KDTree
+
+    # Places of other maps, and of the other kind, lie far away in a third dimension.
+    apart = (2 * where[:, 0] + wrong_now) * 2 * (GAP + 1)
+    points = np.column_stack([apart, where[:, 1:]])
+    pairs = KDTree(points).query_pairs(GAP, p=np.inf, output_type="ndarray")
+    count = len(where)
+    links = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(count, count))
+    return np.asarray(connected_components(links, directed=False)[1], dtype=np.int64)
+
+
+@dataclass(frozen=True, eq=False)
+class _Course:
+    """How the logs that looked at an area found it, one after the other.
+
+    Attributes:
+        log: (N,) in time, from the first that contradicts on.
+        against: (N,) whether it contradicts.
+        m2: median of what those contradict.
+        looked: (M,) all logs that looked, before that, too.
+    """
+
+    log: Ints
+    against: Flags
+    m2: float
+    looked: Ints
+
+
+def _course(log: Ints, sums: se2.Array) -> _Course | None:
+    """None where nothing of weight was ever contradicted."""
+    seen, contradicted = sums.T
+    against = contradicted >= max(AGAINST_M2, AGAINST_SHARE * float(contradicted.max()))
+    is_look = against | (seen >= LOOK_SHARE * float(seen.max()))
+    m2 = float(np.median(contradicted[against])) if against.any() else 0.0
+    if m2 < LEAST_M2:
+        return None
+    log, against = log[is_look], against[is_look]
+    first = int(np.argmax(against))
+    return _Course(log[first:], against[first:], m2, log)
+
+
+def _area(
+    logs: Counted,
+    found: Gathered,
+    course: _Course,
+    map_index: int,
+    cells: Ints,
+    kinds: _Kinds,
+    in_use: InUse,
+) -> Area:
+    low, high = cells.min(axis=0), cells.max(axis=0) + 1
+    near_s, lost_s = _beside(found, map_index, low, high)
+    against = course.log[course.against]
+    turned = np.flatnonzero(course.against != course.against[-1])
+    run = len(course.against) - 1 - (int(turned[-1]) if len(turned) else -1)
+    latest = run if course.against[-1] else -run
+    robots = logs.distinct("robot", against)
+    recent = course.against[-RECENT:]
+    site, version = found.maps[map_index]
+    advice, why = _advice(
+        len(against),
+        robots,
+        logs.distinct("robot", course.looked),
+        latest,
+        float(recent.mean()),
+    )
+    days = [day for day in logs.day[against].tolist() if day is not None]
+    start_ns = logs.start_ns[against]
+    x_min, y_min, x_max, y_max = (PLACE_M * float(edge) for edge in (*low, *high))
+    return Area(
+        site=site,
+        map_version=version,
+        box_m=(x_min, y_min, x_max, y_max),
+        m2=course.m2,
+        kind=kinds.within(map_index, (x_min, y_min, x_max, y_max)),
+        logs=len(against),
+        robots=robots,
+        first_day=min(days, default=None),
+        last_day=max(days, default=None),
+        first_ns=int(start_ns[0]),
+        last_ns=int(start_ns[-1]),
+        visits=len(course.log) - 1,
+        still=len(against) - 1,
+        latest=latest,
+        near_h=near_s / _S_PER_H,
+        lost_near_s=lost_s,
+        in_use=in_use.of(site, version),
+        advice=advice,
+        why=why,
+        example=logs.texts["key"][against[-1]],
+    )
+
+
+def _advice(logs: int, robots: int, looked: int, latest: int, recent: float) -> tuple[Advice, str]:
+    if latest <= -CLEARED:
+        return "temporary", f"the last {-latest} logs that looked found the map right again"
+    if latest < 0:
+        return "watch", "the last log that looked found the map right again, one alone"
+    if logs < LEAST_LOGS:
+        return "watch", f"only {logs} {'log contradicts' if logs == 1 else 'logs contradict'} it"
+    if robots < min(LEAST_ROBOTS, looked):
+        return "watch", f"{looked} robots looked there, and only one found it so"
+    if recent < RECENT_SHARE:
+        return "watch", "it comes and goes"
+    last = "one" if latest == 1 else str(latest)
+    return "re-map", f"{logs} logs contradict it, the last {last} that looked among them"
+
+
+def _beside(found: Gathered, map_index: int, low: Ints, high: Ints) -> tuple[float, float]:
+    """Time of all robots within `NEAR_M` of a box of places, and of it lost, s."""
+    reach = round(NEAR_M / PLACE_M)
+    rows = found.places.of_map(map_index)
+    _, col, row = found.places.split_rows(rows)
+    near = (col >= low[0] - reach) & (col < high[0] + reach)
+    near &= (row >= low[1] - reach) & (row < high[1] + reach)
+    added = found.places.added[rows][near]
+    return float(added[:, HERE].sum()), float(added[:, LOST].sum())
+
+
+class _Kinds:
+    """The changed regions of all logs that count, by map."""
+
+    def __init__(self, now: Snapshot, logs: Counted, found: Gathered) -> None:
+        self._by_map = dict(_regions(now, logs, found))
+
+    def within(self, map_index: int, box_m: tuple[float, float, float, float]) -> str | None:
+        """What most of those are that touch a box."""
+        if map_index not in self._by_map:
+            return None
+        kind, boxes = self._by_map[map_index]
+        x_min, y_min, x_max, y_max = box_m
+        touch = (boxes[:, 0] < x_max) & (boxes[:, 2] > x_min)
+        touch &= (boxes[:, 1] < y_max) & (boxes[:, 3] > y_min)
+        names, counts = np.unique(kind[touch].astype(str), return_counts=True)
+        if not len(names):
+            return None
+        most = int(np.argmax(counts))
+        return str(names[most]) if counts[most] >= ONE_KIND * counts.sum() else "mixed"
+
+
+def _regions(
+    now: Snapshot, logs: Counted, found: Gathered
+) -> Iterator[tuple[int, tuple[NDArray[np.object_], se2.Array]]]:
+    """By map: kinds (R,) and boxes (R, 4)."""
+    number = {name: k for k, name in enumerate(found.maps)}
+    judged = {
+        key: site
+        for key, site, is_judged in zip(
+            logs.texts["key"].tolist(),
+            logs.texts["site"].tolist(),
+            logs.judged.tolist(),
+            strict=True,
+        )
+        if is_judged
+    }
+    columns = ("key", "map_version", "kind", "x_min_m", "y_min_m", "x_max_m", "y_max_m")
+    by_map: dict[int, list[tuple[str, list[float]]]] = {}
+    for table in now.tables("regions", columns):
+        for key, version, kind, *box in zip(
+            *(table[name].to_pylist() for name in columns), strict=True
+        ):
+            if key in judged and (judged[key], version) in number:
+                by_map.setdefault(number[judged[key], version], []).append((kind, box))
+    for map_index, rows in by_map.items():
+        kinds = np.array([kind for kind, _ in rows], dtype=object)
+        yield map_index, (kinds, np.array([box for _, box in rows], dtype=np.float64))
+
+
+_ADVICES: tuple[Advice, ...] = ("re-map", "watch", "temporary")
+
+
+def worth(area: Area) -> float:
+    """What mapping it again would help: m2 x persistence x hours beside it."""
+    return area.m2 * (area.still + 1) / (area.visits + 2) * area.near_h
+
+
+def _order(area: Area) -> tuple[object, ...]:
+    return (
+        not area.in_use,
+        _ADVICES.index(area.advice),
+        -worth(area),
+        area.site or "",
+        area.map_version,
+        area.box_m,
+    )

@@ -1,0 +1,108 @@
+"""Intervals of shares and rates that are honest about few logs, and about logs that are alike.
+
+Logs of one robot are no independent draws: a badly mounted laser fails all of them. Shares count
+for as many independent logs as they are worth by the intraclass correlation of robots, rates are
+widened by the dispersion between robots. Both are taken from the whole fleet, for a single group
+hardly tells them.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from slamreplay.geometry import se2
+
+#: 97.5 % quantile of the normal distribution: all intervals are of 95 %.
+Z = 1.959963984540054
+_LEVEL = 0.95
+
+
+def wilson(share: float, n: float) -> tuple[float, float]:
+    """Wilson's score interval (Wilson 1927) of a share of `n` independent ones, n > 0.
+
+    `n` need not be whole: it is the effective number (Korn and Graubard 1998).
+    """
+    middle = share + Z * Z / (2.0 * n)
+    half = Z * np.sqrt(share * (1.0 - share) / n + Z * Z / (4.0 * n * n))
+    scale = 1.0 + Z * Z / n
+    return max(0.0, float(middle - half) / scale), min(1.0, float(middle + half) / scale)
+
+
+def newcombe(was: tuple[float, float], now: tuple[float, float]) -> tuple[float, float]:
+    """Interval of the difference `now` - `was` of two shares, each given with its `n`.
+
+    Method 10 of Newcombe 1998, Statistics in Medicine 17, 873: square-and-add of both Wilson
+    intervals.
+    """
+    (p, n), (q, m) = was, now
+    (p_low, p_high), (q_low, q_high) = wilson(p, n), wilson(q, m)
+    down, up = np.hypot(q - q_low, p_high - p), np.hypot(q_high - q, p - p_low)
+    return float(q - p - down), float(q - p + up)
+
+
+def garwood(events: float, exposure: float) -> tuple[float, float]:
+    """Exact interval of a Poisson rate (Garwood 1936), by quantiles of the gamma distribution.
+
+    Args:
+        events: counted; over-dispersed counts are divided by their dispersion, and so is
+            `exposure`.
+        exposure: greater than zero.
+    """
+    from scipy.special import gammaincinv
+
+    tail = (1.0 - _LEVEL) / 2.0
+    low = gammaincinv(events, tail) if events > 0 else 0.0
+    return float(low) / exposure, float(gammaincinv(events + 1.0, 1.0 - tail)) / exposure
+
+
+def intraclass_correlation(yes: NDArray[np.bool_], cluster: NDArray[np.int64]) -> float:
+    """How much alike logs of one robot are, from 0 to 1, by analysis of variance.
+
+    (B - W) / (B + (m - 1) W) of the mean squares between and within, m the adjusted mean size of
+    unequal clusters (Donner 1986; of binary outcomes Ridout et al. 1999). 0 where it cannot be
+    told: of fewer than two robots, or where none has two logs.
+
+    Args:
+        yes: (N,) outcome of each log.
+        cluster: (N,) whose log it is.
+    """
+    _, index, size = np.unique(cluster, return_inverse=True, return_counts=True)
+    n, k = len(yes), len(size)
+    if k < 2 or n <= k:
+        return 0.0
+    share = np.bincount(index, weights=yes, minlength=k) / size
+    between = float((size * (share - yes.mean()) ** 2).sum()) / (k - 1)
+    within = float((size * share * (1.0 - share)).sum()) / (n - k)
+    typical = (n - float((size.astype(float) ** 2).sum()) / n) / (k - 1)
+    total = between + (typical - 1.0) * within
+    return min(1.0, max(0.0, (between - within) / total)) if total > 0 else 0.0
+
+
+def effective(cluster: NDArray[np.int64], correlation: float) -> float:
+    """How many independent logs the logs of these clusters (N,) are worth.
+
+    By the design effect of Kish 1965, 1 + correlation (m - 1), with m the size of the cluster that
+    a log is in, on average: sum of squared sizes over N.
+    """
+    sizes = np.unique(cluster, return_counts=True)[1].astype(float)
+    n = len(cluster)
+    return n / (1.0 + correlation * (float((sizes**2).sum()) / n - 1.0)) if n else 0.0
+
+
+def dispersion(events: se2.Array, expected: se2.Array, parameters: int) -> float:
+    """Variance of counts (K,) over that of Poisson's, at least 1: Pearson's chi2 per freedom.
+
+    The usual estimate of quasi-Poisson models (McCullagh and Nelder 1989, chapter 6).
+
+    Args:
+        events: (K,) counted.
+        expected: (K,) by the common rate.
+        parameters: how many were fitted.
+    """
+    there = expected > 0
+    freedom = int(there.sum()) - parameters
+    if freedom < 1:
+        return 1.0
+    off = events[there] - expected[there]
+    return max(1.0, float((off**2 / expected[there]).sum()) / freedom)

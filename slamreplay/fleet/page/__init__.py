@@ -1,0 +1,1 @@
+"""fleet.html: what a fleet team opens in the morning, one file."""
