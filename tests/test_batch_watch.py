@@ -18,8 +18,9 @@ import slamreplay.batch.watch as watched
 from slamreplay.batch.keys import task_of
 from slamreplay.batch.settling import Patience, Settling
 from slamreplay.batch.sources import NoLogError, sources_of
+from slamreplay.batch.stores import store_error
 from slamreplay.batch.task import LogResult
-from slamreplay.batch.watch import Pace, Tally, watch
+from slamreplay.batch.watch import Pace, Tally, is_passing, watch
 from slamreplay.batch.whole import completeness
 from slamreplay.errors import LogError, OutputError
 from slamreplay.fleet.schema import arrow_schema
@@ -357,6 +358,19 @@ def test_what_a_worker_lacked_is_tried_again_ever_later(bench):
     assert bench.rows() == ["a.mcap"]
     assert [one.has_failed for one in bench.finished] == [False]
     assert len([told for told in bench.told if line in told]) == 1
+
+
+@pytest.mark.parametrize(
+    ("fault", "passes"),
+    [
+        (TimeoutError(), True),
+        (PermissionError(), True),
+        (OSError(errno.ENOSPC, "full"), True),
+        (FileNotFoundError(), False),
+    ],
+)
+def test_which_faults_of_a_store_pass(fault, passes):
+    assert is_passing(str(store_error(fault, "s3://bucket/a.mcap", {}))) == passes
 
 
 def test_a_log_that_cannot_be_read_is_done_once(bench):

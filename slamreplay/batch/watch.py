@@ -26,13 +26,15 @@ from slamreplay.errors import OutputError, SlamreplayError
 #: The results of tasks, as `loop.looked_back` gives them.
 LookBack = Callable[[Sequence[LogTask]], Generator[LogResult]]
 
-#: What lacks to the machine and not to the log: it is tried again, for good.
-_PASSING = tuple(
-    os.strerror(number)
-    for number in (
+#: What lines of failed logs say where the machine or a store lacks something and not the log.
+_PASSING = (
+    *map(os.strerror, (
         errno.ENOSPC, errno.EDQUOT, errno.ESTALE, errno.EIO, errno.ENOTCONN, errno.ETIMEDOUT,
         errno.EHOSTUNREACH, errno.ENETUNREACH, errno.ECONNREFUSED, errno.ECONNRESET, errno.EMFILE,
-    )
+    )),
+    # of stores.store_error
+    "does not answer", "the server answers", "no room to copy it to", "access denied",
+    "there are no credentials for it",
 )  # fmt: skip
 #: The longest time between two trials of such a log, s.
 _LONGEST_S = 3600.0
@@ -239,7 +241,7 @@ class _Rounds:
             # What was read may be half of the old log and half of the new one.
             self.tell(f"{source.log}: changed while it was read, so it waits again")
             return
-        if result.error is not None and any(lack in result.error for lack in _PASSING):
+        if result.error is not None and is_passing(result.error):
             self._put_off(source, result.error)
             return
         self.written(lambda: commit_result(self.target, result))
@@ -268,6 +270,11 @@ class _Rounds:
         elif line and self.told.get(what) != line:
             self.told[what] = line
             self.tell(line)
+
+
+def is_passing(line: str) -> bool:
+    """Whether a failed log may well be read another time, by the line that says why it failed."""
+    return any(lack in line for lack in _PASSING)
 
 
 def _finished(target: Path, result: LogResult) -> Finished:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import signal
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -34,6 +35,16 @@ Folder = Annotated[
 ]
 Recipe = Annotated[
     Path | None, typer.Option("--recipe", metavar="YAML", help="Hold each log against this gate.")
+]
+Maps = Annotated[
+    str | None,
+    typer.Option(
+        "--maps", metavar="CSV", help="Which map and labels belong to which logs, by pattern."
+    ),
+]
+Storage = Annotated[
+    list[str] | None,
+    typer.Option("--storage", metavar="KEY=VALUE", help="Option of fsspec for addresses."),
 ]
 Every = Annotated[
     float, typer.Option("--every", metavar="S", min=0.1, help="Time between two looks, in s.")
@@ -80,6 +91,8 @@ def _watch(
     folder: Folder,
     output: Output,
     recipe: Recipe = None,
+    maps: Maps = None,
+    storage: Storage = None,
     every_s: Every = 30.0,
     settle_s: Settle = 10.0,
     give_up_s: GiveUp = 3600.0,
@@ -94,13 +107,15 @@ def _watch(
     from slamreplay.batch.cluster import Workers
     from slamreplay.batch.keys import task_of
     from slamreplay.batch.settling import Patience, Settling
+    from slamreplay.batch.stores import storage_options
     from slamreplay.batch.watch import Pace, Tally, served, watch
     from slamreplay.batch.whole import completeness
 
     who = Workers(workers, memory_limit, scheduler).checked()
     _check_apart(folder, output)
     hook = _hook(on_finished)
-    demands = _demands(recipe)
+    demands, options = _demands(recipe), storage_options(storage or ())
+    tell = _new_only(complain)
     per_round = _PER_ROUND if scheduler is None else _PER_ROUND_OF_CLUSTER
     tally = Tally()
 
@@ -115,14 +130,14 @@ def _watch(
         with _terminable():
             watch(
                 output,
-                lambda: _sources(folder),
+                lambda: _sources(folder, maps, options, tell),
                 Settling(Patience(settle_s, give_up_s), completeness),
-                lambda source: task_of(source, cause=cause, demands=demands),
+                lambda source: task_of(source, cause=cause, demands=demands, storage=options),
                 lambda scratch: served(who, scratch),
                 pace=Pace(every_s, per_round, is_once=once),
                 tell=complain,
                 finished=finished,
-                finish_round=lambda: _write_pages(output),
+                finish_round=lambda: _write_page(output, tell),
                 tally=tally,
             )
     except KeyboardInterrupt as stop:
@@ -141,16 +156,34 @@ def _check_apart(folder: str, output: Path) -> None:
         raise UsageError("lies in the folder that is watched", where=output, hint="give another -o")
 
 
-def _sources(folder: str) -> list[LogSource]:
+def _sources(
+    folder: str, maps: str | None, storage: dict[str, object], tell: Callable[[str], None]
+) -> list[LogSource]:
+    """The logs there are now; the table is read at every look, so that robots can be added."""
     from slamreplay.batch.addresses import is_local
+    from slamreplay.batch.maps_table import read_maps_table
     from slamreplay.batch.sources import NoLogError, sources_of
 
     if is_local(folder) and not Path(folder).is_dir():
         raise LogError("there is no such folder", where=folder)
+    table = None if maps is None else read_maps_table(maps, storage)
     try:
-        return sources_of([folder])
+        return sources_of([folder], table, storage, tell=tell)
     except NoLogError:
         return []  # none yet
+
+
+def _new_only(tell: Callable[[str], None]) -> Callable[[str], None]:
+    """Tells what was not told before; what only counts otherwise was."""
+    told: set[str] = set()
+
+    def say(line: str) -> None:
+        plain = re.sub(r"\d+", "", line)
+        if plain not in told:
+            told.add(plain)
+            tell(line)
+
+    return say
 
 
 def _demands(recipe: Path | None) -> Demands | None:
@@ -164,8 +197,10 @@ def _demands(recipe: Path | None) -> Demands | None:
     return read.demands
 
 
-def _write_pages(output: Path) -> None:
-    """The fleet's page and queries, of all that is in the folder now."""
+def _write_page(output: Path, tell: Callable[[str], None]) -> None:
+    from slamreplay.fleet.page.writer import write_fleet_page
+
+    write_fleet_page(output, warn=tell)
 
 
 @contextmanager
