@@ -8,6 +8,7 @@ from slamreplay.fleet.answers import Answers
 from slamreplay.fleet.areas import areas, looks_at_changes
 from slamreplay.fleet.causes import causes
 from slamreplay.fleet.counted import Counted, counted
+from slamreplay.fleet.failures import failures
 from slamreplay.fleet.gathered import Gathered, gathered
 from slamreplay.fleet.in_use import InUse
 from slamreplay.fleet.map_places import map_places
@@ -15,6 +16,7 @@ from slamreplay.fleet.picks import picks
 from slamreplay.fleet.snapshot import Snapshot, of_now
 from slamreplay.fleet.spots import spots
 from slamreplay.fleet.steps import steps
+from slamreplay.fleet.troubles import troubles_s
 from slamreplay.fleet.verdicts import Alike, verdicts
 
 
@@ -50,6 +52,8 @@ def _answers(now: Snapshot, logs: Counted, lines: list[str]) -> Answers:
         steps=steps(logs, alike),
         maps=map_places(logs, found, seen, in_use),
         copies=logs.copies,
+        failures=failures(logs),
+        troubles_s=troubles_s(now, logs),
         logs=dict(
             zip(
                 logs.texts["key"].tolist(),

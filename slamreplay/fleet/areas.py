@@ -1,8 +1,8 @@
 """Which parts of a map are no longer true, and whether that stays: what to map again.
 
 One log that contradicts the map may have met a pallet. What counts is what later logs saw there:
-places whose latest looks contradict the map are laid together to areas apart from those that were
-found right again, and each area is judged by the logs that looked at it, one after the other.
+places that the latest looks contradict are laid together to areas apart from those that were found
+right again, and each area is judged by the logs that looked at it, one after the other.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slamreplay.fleet.answers import NEAR_M, Advice, Area
-from slamreplay.fleet.cells import AGAINST_M2, Ints, Maps, Rows, starts
+from slamreplay.fleet.cells import AGAINST_M2, Ints, Maps, Rows, of_map, split, starts
 from slamreplay.fleet.counted import Counted, Flags
 from slamreplay.fleet.gathered import AGAINST, HERE, LOST, Gathered, looks
 from slamreplay.fleet.in_use import InUse
@@ -25,7 +25,8 @@ from slamreplay.geometry import se2
 if TYPE_CHECKING:
     from slamreplay.fleet.snapshot import Snapshot
 
-#: A place is wrong now if half of so many latest looks say so: one look may miss it.
+#: A place may be wrong now if one of so many latest looks says so: the edge of what was moved is
+#: seen from one side only. Others were found right again, and are laid together apart from these.
 LATEST_LOOKS = 3
 #: Places this far from each other, in rows or columns, are of one area: a gap of one is bridged.
 GAP = 2
@@ -38,7 +39,7 @@ LEAST_M2 = 0.1
 #: that was knocked contradicts everything, but it is of one robot.
 LEAST_LOGS, LEAST_ROBOTS = 3, 2
 #: And so much of so many latest looks.
-RECENT, RECENT_SHARE = 5, 0.6
+RECENT, RECENT_SHARE = 5, 0.7
 #: So many looks in a row that find the map right: what stood there is gone.
 CLEARED = 2
 #: Regions within an area are of one kind if so many are.
@@ -142,15 +143,14 @@ def areas(
 
 
 def _wrong_now(seen: Looks) -> Flags:
-    """(P,) whether the latest looks at each place contradict the map, half of them at least."""
+    """(P,) whether one of the latest looks at each place contradicts the map."""
     last = np.append(starts(seen.place)[1:], len(seen.place))
-    count, against = np.zeros(len(last)), np.zeros(len(last))
+    wrong = np.zeros(len(last), dtype=bool)
     for back in range(1, LATEST_LOOKS + 1):
         at = np.maximum(last - back, 0)
         is_there = (last - back >= 0) & (seen.place[at] == np.arange(len(last)))
-        count += is_there
-        against += is_there & seen.against[at]
-    return np.asarray(2 * against >= count)
+        wrong |= is_there & seen.against[at]
+    return wrong
 
 
 def _together(where: Ints, wrong_now: Flags) -> Ints:
@@ -208,7 +208,7 @@ def _area(
     in_use: InUse,
 ) -> Area:
     low, high = cells.min(axis=0), cells.max(axis=0) + 1
-    near_s, lost_s = _beside(found, map_index, low, high)
+    near_s, lost_s, lost_near = _beside(found, map_index, low, high)
     against = course.log[course.against]
     turned = np.flatnonzero(course.against != course.against[-1])
     run = len(course.against) - 1 - (int(turned[-1]) if len(turned) else -1)
@@ -243,6 +243,7 @@ def _area(
         latest=latest,
         near_h=near_s / _S_PER_H,
         lost_near_s=lost_s,
+        lost_near=lost_near,
         in_use=in_use.of(site, version),
         advice=advice,
         why=why,
@@ -265,15 +266,20 @@ def _advice(logs: int, robots: int, looked: int, latest: int, recent: float) -> 
     return "re-map", f"{logs} logs contradict it, the last {last} that looked among them"
 
 
-def _beside(found: Gathered, map_index: int, low: Ints, high: Ints) -> tuple[float, float]:
-    """Time of all robots within `NEAR_M` of a box of places, and of it lost, s."""
+def _beside(found: Gathered, map_index: int, low: Ints, high: Ints) -> tuple[float, float, int]:
+    """Time of all robots within `NEAR_M` of a box, of it lost, s, and the logs that were lost."""
     reach = round(NEAR_M / PLACE_M)
-    rows = found.places.of_map(map_index)
-    _, col, row = found.places.split_rows(rows)
-    near = (col >= low[0] - reach) & (col < high[0] + reach)
-    near &= (row >= low[1] - reach) & (row < high[1] + reach)
-    added = found.places.added[rows][near]
-    return float(added[:, HERE].sum()), float(added[:, LOST].sum())
+
+    def near(code: Ints) -> Flags:
+        _, col, row = split(code)
+        across = (col >= low[0] - reach) & (col < high[0] + reach)
+        return across & (row >= low[1] - reach) & (row < high[1] + reach)
+
+    rows = of_map(found.places.code, map_index)
+    added = found.places.added[rows][near(found.places.code[rows])]
+    lost = of_map(found.lost.place, map_index)
+    who = found.lost.by[lost][near(found.lost.place[lost])]
+    return float(added[:, HERE].sum()), float(added[:, LOST].sum()), len(np.unique(who))
 
 
 class _Kinds:

@@ -21,8 +21,9 @@ if TYPE_CHECKING:
 
 #: A log looked at a place if its beams checked a quarter of it: less of it may lie behind a corner.
 LOOK_M2 = 0.25 * PLACE_M**2
-#: A log contradicts a place by five cells of 0.1 m. What stands there newly shows a front of ten
-#: and more; in healthy logs no place had three.
+#: A log contradicts a place by five cells of 0.1 m. Racks that were moved for good in a simulated
+#: hall made 0.08 to 0.24 m2 of a place, log after log; 24 logs of a hall that stayed as it was made
+#: none anywhere.
 AGAINST_M2 = 0.05
 #: Edge of a spot in places.
 SPOT = round(SPOT_M / PLACE_M)
@@ -56,20 +57,21 @@ class Sums:
         """Map, column and row of each."""
         return split(self.code)
 
-    def split_rows(self, rows: slice) -> tuple[Ints, Ints, Ints]:
-        """The same of some."""
-        return split(self.code[rows])
-
     def of_map(self, index: int) -> slice:
         """The rows of a map."""
-        ends = np.searchsorted(self.code, [index << (2 * _BITS), (index + 1) << (2 * _BITS)])
-        return slice(int(ends[0]), int(ends[1]))
+        return of_map(self.code, index)
 
 
 def split(code: Ints) -> tuple[Ints, Ints, Ints]:
     """Map, column and row of codes (N,)."""
     mask = (1 << _BITS) - 1
     return code >> (2 * _BITS), ((code >> _BITS) & mask) - _HALF, (code & mask) - _HALF
+
+
+def of_map(code: Ints, index: int) -> slice:
+    """The rows of a map among ascending codes (N,)."""
+    ends = np.searchsorted(code, [index << (2 * _BITS), (index + 1) << (2 * _BITS)])
+    return slice(int(ends[0]), int(ends[1]))
 
 
 def coded(map_index: Ints, col: Ints, row: Ints) -> Ints:
