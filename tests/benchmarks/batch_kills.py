@@ -62,7 +62,7 @@ def of_a_cluster(folder, target, logs, kills, chance):
             while client.poll() is None and time.monotonic() < end:
                 time.sleep(0.02)
             if client.poll() is not None or sum(killed.values()) >= kills:
-                code, _, err = finished(client)
+                code, _, err = finished(client, timeout=3600)
                 assert (code, err) == (0, ""), err
                 return killed, runs
             victim = chance.choice(["client", "worker", "scheduler"])
@@ -99,7 +99,7 @@ def of_its_own(folder, target, logs, kills, chance):
                 starts, end = True, time.monotonic() + chance.uniform(0.0, 4.0)
             time.sleep(0.02)
         if client.poll() is not None or sum(killed.values()) >= kills:
-            code, _, err = finished(client)
+            code, _, err = finished(client, timeout=3600)
             assert (code, err) == (0, ""), err
             return killed, runs
         workers = workers_of(client)
