@@ -5,9 +5,13 @@ from dataclasses import replace
 import pyarrow as pa
 import pytest
 
+from slamreplay.batch import run
+from slamreplay.batch.cluster import Workers
 from slamreplay.batch.keys import key_of
 from slamreplay.batch.relabel import relabel
+from slamreplay.batch.run import run_batch
 from slamreplay.batch.task import LogFile, LogSource, LogTask
+from slamreplay.batch.worker import failed
 from slamreplay.fleet.schema import TABLES, arrow_schema
 from slamreplay.fleet.store import commit, read
 
@@ -44,6 +48,25 @@ def test_only_the_labels_of_the_logs_that_bear_others_change(folder):
     for name in set(TABLES) - {"logs"}:
         assert read(folder, name).equals(before[name])
     assert relabel(folder, told) == 0
+
+
+def test_a_batch_that_is_run_again_with_other_labels_tells_and_does_nothing_else(
+    tmp_path, monkeypatch
+):
+    given = []
+
+    def looked_back(tasks, _workers, _scratch):
+        given.extend(tasks)
+        for one in tasks:
+            yield failed(one, "it is torn")
+
+    monkeypatch.setattr(run, "looked_back", looked_back)
+    one, told = task("0" * 32, site="n"), []
+    run_batch([one], tmp_path / "b", Workers())
+    run_batch([task(one.key, site="s")], tmp_path / "b", Workers(), tell=told.append)
+    assert given == [one]
+    assert told == ["1 logs that were there have other labels now"]
+    assert read(tmp_path / "b", "logs")["site"].to_pylist() == ["s"]
 
 
 def test_labels_are_no_part_of_a_key():

@@ -34,6 +34,8 @@ def relabel(target: Path, tasks: Sequence[LogTask]) -> int:
         OutputError: the folder cannot be written.
     """
     said = {task.key: _columns(labels_of(task.source, None)) for task in tasks}
+    if not any(said.values()):
+        return 0
     rows = {row["key"]: row for row in _labels_there(target)}
     changed = {
         key: labels
