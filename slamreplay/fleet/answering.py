@@ -15,6 +15,7 @@ from slamreplay.fleet.picks import picks
 from slamreplay.fleet.snapshot import Snapshot, of_now
 from slamreplay.fleet.spots import spots
 from slamreplay.fleet.steps import steps
+from slamreplay.fleet.troubles import failures, troubles_s
 from slamreplay.fleet.verdicts import Alike, verdicts
 
 
@@ -50,6 +51,7 @@ def _answers(now: Snapshot, logs: Counted, lines: list[str]) -> Answers:
         steps=steps(logs, alike),
         maps=map_places(logs, found, seen, in_use),
         copies=logs.copies,
+        failures=failures(logs),
         logs=dict(
             zip(
                 logs.texts["key"].tolist(),
@@ -57,6 +59,7 @@ def _answers(now: Snapshot, logs: Counted, lines: list[str]) -> Answers:
                 strict=True,
             )
         ),
+        troubles_s=troubles_s(now, logs),
         alike=float(logs.judged.sum()) / worth if worth else 1.0,
         remarks=tuple(dict.fromkeys([*lines, *_remarks(logs, found)])),
     )

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slamreplay.fleet.answers import NEAR_M, Advice, Area
-from slamreplay.fleet.cells import AGAINST_M2, Ints, Maps, Rows, starts
+from slamreplay.fleet.cells import AGAINST_M2, SPOT, Ints, Maps, Rows, split, starts
 from slamreplay.fleet.counted import Counted, Flags
 from slamreplay.fleet.gathered import AGAINST, HERE, LOST, Gathered, looks
 from slamreplay.fleet.in_use import InUse
@@ -243,6 +243,7 @@ def _area(
         latest=latest,
         near_h=near_s / _S_PER_H,
         lost_near_s=lost_s,
+        lost_near=_became_lost_beside(found, map_index, low, high),
         in_use=in_use.of(site, version),
         advice=advice,
         why=why,
@@ -274,6 +275,16 @@ def _beside(found: Gathered, map_index: int, low: Ints, high: Ints) -> tuple[flo
     near &= (row >= low[1] - reach) & (row < high[1] + reach)
     added = found.places.added[rows][near]
     return float(added[:, HERE].sum()), float(added[:, LOST].sum())
+
+
+def _became_lost_beside(found: Gathered, map_index: int, low: Ints, high: Ints) -> int:
+    """Logs in which the robot became lost in a spot that reaches within `NEAR_M` of a box."""
+    lost, reach = found.lost, NEAR_M / PLACE_M
+    index, col, row = split(lost.spot)
+    near = (index == map_index) & (lost.entered > 0)
+    for axis, at in enumerate((col, row)):
+        near &= ((at + 1) * SPOT > low[axis] - reach) & (at * SPOT < high[axis] + reach)
+    return len(np.unique(lost.log[near]))
 
 
 class _Kinds:
