@@ -19,6 +19,8 @@ from slamreplay.version import __version__
 
 #: Days of the trend; what is older is in the table of days, as far as that goes.
 _MOST_DAYS = 42
+#: Up to here logs of one robot are as different as those of several.
+_HARDLY_ALIKE = 1.05
 #: Names of the queries that stand under the page's answers.
 QUERIES = ("areas", "picks", "places", "causes", "steps", "software", "robot", "site",
            "map_version", "day", "gate", "failed")  # fmt: skip
@@ -93,6 +95,8 @@ def view_of(answers: Answers, images: Mapping[str, MapImage], sql: Mapping[str, 
     needed, maps = remap.needed(answers.areas), by_trouble(answers.maps)
     cards = remap.cards(needed, answers.maps, named, reports)
     others = (*needed[remap.MOST_CARDS :], *(a for a in answers.areas if a.advice != "re-map"))
+    sites: dict[str | None, str] = {one.map_version: words.label(one.site) for one in answers.maps}
+    picks = logs.picks(answers.picks, reports)
     days = [(g.name, g.states) for g in answers.by["day"] if g.name is not None]
     return FleetView(
         version=__version__,
@@ -120,14 +124,15 @@ def view_of(answers: Answers, images: Mapping[str, MapImage], sql: Mapping[str, 
         cards=cards,
         cards_more=len(needed) - len(cards),
         areas=remap.rest(others, reports),
-        picks=logs.picks(answers.picks, reports),
-        picks_more=max(len(answers.picks) - logs.MOST_PICKS, 0),
+        picks=picks,
+        picks_more=len(answers.picks) - len(picks),
         maps=site_maps(maps, named),
         maps_more=max(len(maps) - MOST_MAPS, 0),
         causes=logs.causes(answers.causes, reports),
         steps=step_table(answers.steps),
         groups=tuple(
-            group_table(what, answers.by[what]) for what in ("robot", "site", "map_version", "day")
+            group_table(what, answers.by[what], sites if what == "map_version" else None)
+            for what in ("robot", "site", "map_version", "day")
         ),
         software=group_table("software", answers.by["software"]),
         gate_rows=_gate(answers),
@@ -135,7 +140,7 @@ def view_of(answers: Answers, images: Mapping[str, MapImage], sql: Mapping[str, 
         failures=logs.failures(answers.failures),
         copies=logs.copies(answers.copies),
         remarks=answers.remarks,
-        alike=f"{answers.alike:.1f}",
+        alike=f"{answers.alike:.1f}" if answers.alike > _HARDLY_ALIKE else "",
         sql={name: sql.get(name, "") for name in QUERIES},
     )
 
