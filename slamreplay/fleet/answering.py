@@ -8,6 +8,7 @@ from slamreplay.fleet.answers import Answers
 from slamreplay.fleet.areas import areas, looks_at_changes
 from slamreplay.fleet.causes import causes
 from slamreplay.fleet.counted import Counted, counted
+from slamreplay.fleet.failures import failures
 from slamreplay.fleet.gathered import Gathered, gathered
 from slamreplay.fleet.in_use import InUse
 from slamreplay.fleet.map_places import map_places
@@ -15,7 +16,7 @@ from slamreplay.fleet.picks import picks
 from slamreplay.fleet.snapshot import Snapshot, of_now
 from slamreplay.fleet.spots import spots
 from slamreplay.fleet.steps import steps
-from slamreplay.fleet.troubles import failures, troubles_s
+from slamreplay.fleet.troubles import troubles_s
 from slamreplay.fleet.verdicts import Alike, verdicts
 
 
@@ -52,6 +53,7 @@ def _answers(now: Snapshot, logs: Counted, lines: list[str]) -> Answers:
         maps=map_places(logs, found, seen, in_use),
         copies=logs.copies,
         failures=failures(logs),
+        troubles_s=troubles_s(now, logs),
         logs=dict(
             zip(
                 logs.texts["key"].tolist(),
@@ -59,7 +61,6 @@ def _answers(now: Snapshot, logs: Counted, lines: list[str]) -> Answers:
                 strict=True,
             )
         ),
-        troubles_s=troubles_s(now, logs),
         alike=float(logs.judged.sum()) / worth if worth else 1.0,
         remarks=tuple(dict.fromkeys([*lines, *_remarks(logs, found)])),
     )

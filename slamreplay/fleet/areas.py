@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slamreplay.fleet.answers import NEAR_M, Advice, Area
-from slamreplay.fleet.cells import AGAINST_M2, SPOT, Ints, Maps, Rows, split, starts
+from slamreplay.fleet.cells import AGAINST_M2, Ints, Maps, Rows, of_map, split, starts
 from slamreplay.fleet.counted import Counted, Flags
 from slamreplay.fleet.gathered import AGAINST, HERE, LOST, Gathered, looks
 from slamreplay.fleet.in_use import InUse
@@ -38,7 +38,7 @@ LEAST_M2 = 0.1
 #: that was knocked contradicts everything, but it is of one robot.
 LEAST_LOGS, LEAST_ROBOTS = 3, 2
 #: And so much of so many latest looks.
-RECENT, RECENT_SHARE = 5, 0.6
+RECENT, RECENT_SHARE = 5, 0.7
 #: So many looks in a row that find the map right: what stood there is gone.
 CLEARED = 2
 #: Regions within an area are of one kind if so many are.
@@ -208,7 +208,7 @@ def _area(
     in_use: InUse,
 ) -> Area:
     low, high = cells.min(axis=0), cells.max(axis=0) + 1
-    near_s, lost_s = _beside(found, map_index, low, high)
+    near_s, lost_s, lost_near = _beside(found, map_index, low, high)
     against = course.log[course.against]
     turned = np.flatnonzero(course.against != course.against[-1])
     run = len(course.against) - 1 - (int(turned[-1]) if len(turned) else -1)
@@ -243,7 +243,7 @@ def _area(
         latest=latest,
         near_h=near_s / _S_PER_H,
         lost_near_s=lost_s,
-        lost_near=_became_lost_beside(found, map_index, low, high),
+        lost_near=lost_near,
         in_use=in_use.of(site, version),
         advice=advice,
         why=why,
@@ -266,25 +266,20 @@ def _advice(logs: int, robots: int, looked: int, latest: int, recent: float) -> 
     return "re-map", f"{logs} logs contradict it, the last {last} that looked among them"
 
 
-def _beside(found: Gathered, map_index: int, low: Ints, high: Ints) -> tuple[float, float]:
-    """Time of all robots within `NEAR_M` of a box of places, and of it lost, s."""
+def _beside(found: Gathered, map_index: int, low: Ints, high: Ints) -> tuple[float, float, int]:
+    """Time of all robots within `NEAR_M` of a box, of it lost, s, and the logs that were lost."""
     reach = round(NEAR_M / PLACE_M)
-    rows = found.places.of_map(map_index)
-    _, col, row = found.places.split_rows(rows)
-    near = (col >= low[0] - reach) & (col < high[0] + reach)
-    near &= (row >= low[1] - reach) & (row < high[1] + reach)
-    added = found.places.added[rows][near]
-    return float(added[:, HERE].sum()), float(added[:, LOST].sum())
 
+    def near(code: Ints) -> Flags:
+        _, col, row = split(code)
+        across = (col >= low[0] - reach) & (col < high[0] + reach)
+        return across & (row >= low[1] - reach) & (row < high[1] + reach)
 
-def _became_lost_beside(found: Gathered, map_index: int, low: Ints, high: Ints) -> int:
-    """Logs in which the robot became lost in a spot that reaches within `NEAR_M` of a box."""
-    lost, reach = found.lost, NEAR_M / PLACE_M
-    index, col, row = split(lost.spot)
-    near = (index == map_index) & (lost.entered > 0)
-    for axis, at in enumerate((col, row)):
-        near &= ((at + 1) * SPOT > low[axis] - reach) & (at * SPOT < high[axis] + reach)
-    return len(np.unique(lost.log[near]))
+    rows = of_map(found.places.code, map_index)
+    added = found.places.added[rows][near(found.places.code[rows])]
+    lost = of_map(found.lost.place, map_index)
+    who = found.lost.by[lost][near(found.lost.place[lost])]
+    return float(added[:, HERE].sum()), float(added[:, LOST].sum()), len(np.unique(who))
 
 
 class _Kinds:

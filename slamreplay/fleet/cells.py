@@ -56,20 +56,21 @@ class Sums:
         """Map, column and row of each."""
         return split(self.code)
 
-    def split_rows(self, rows: slice) -> tuple[Ints, Ints, Ints]:
-        """The same of some."""
-        return split(self.code[rows])
-
     def of_map(self, index: int) -> slice:
         """The rows of a map."""
-        ends = np.searchsorted(self.code, [index << (2 * _BITS), (index + 1) << (2 * _BITS)])
-        return slice(int(ends[0]), int(ends[1]))
+        return of_map(self.code, index)
 
 
 def split(code: Ints) -> tuple[Ints, Ints, Ints]:
     """Map, column and row of codes (N,)."""
     mask = (1 << _BITS) - 1
     return code >> (2 * _BITS), ((code >> _BITS) & mask) - _HALF, (code & mask) - _HALF
+
+
+def of_map(code: Ints, index: int) -> slice:
+    """The rows of a map among ascending codes (N,)."""
+    ends = np.searchsorted(code, [index << (2 * _BITS), (index + 1) << (2 * _BITS)])
+    return slice(int(ends[0]), int(ends[1]))
 
 
 def coded(map_index: Ints, col: Ints, row: Ints) -> Ints:

@@ -35,12 +35,23 @@ SPOT_LOGS = LOST_LOGS
 
 @dataclass(frozen=True, eq=False)
 class Lost:
-    """Where each log was lost, and where it became lost: rows (N,) by log and spot."""
+    """Where each log was lost.
+
+    Attributes:
+        log: (N,) log of each row.
+        spot: (N,) at which it was lost, or became lost.
+        lost_s: (N,) for how long.
+        entered: (N,) how often it became lost there.
+        place: (M,) places at which a log was lost, ascending.
+        by: (M,) which log.
+    """
 
     log: Ints
     spot: Ints
     lost_s: se2.Array
     entered: se2.Array
+    place: Ints
+    by: Ints
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,12 +78,26 @@ def gathered(now: Snapshot, logs: Counted) -> Gathered:
     maps = Maps(logs)
     places, spots = Adding(7), Adding(5)
     lost: list[tuple[Ints, Ints, se2.Array, se2.Array]] = []
+    at: list[tuple[Ints, Ints]] = []
     for rows in maps.rows(now, (*_TIMES, *_SEEN)):
         places.add(*_of_places(rows, logs))
         lost.append(_of_spots(rows, spots))
-    empty = (np.empty(0, np.int64), np.empty(0, np.int64), np.empty(0), np.empty(0))
-    held = [np.concatenate([part[k] for part in (empty, *lost)]) for k in range(4)]
-    return Gathered(tuple(maps.names), places.sums(), spots.sums(), Lost(*held), maps.left_out)
+        was = rows.numbers["lost_s"] > 0
+        at.append((rows.code[was], rows.log[was]))
+    none = np.empty(0, dtype=np.int64)
+    empty = (none, none, np.empty(0), np.empty(0))
+    log, spot, lost_s, entered = (
+        np.concatenate([part[k] for part in (empty, *lost)]) for k in range(4)
+    )
+    place, by = (np.concatenate([part[k] for part in ((none, none), *at)]) for k in range(2))
+    order = np.lexsort((by, place))
+    return Gathered(
+        tuple(maps.names),
+        places.sums(),
+        spots.sums(),
+        Lost(log, spot, lost_s, entered, place[order], by[order]),
+        maps.left_out,
+    )
 
 
 def _of_places(rows: Rows, logs: Counted) -> tuple[Ints, se2.Array, se2.Array]:

@@ -90,6 +90,35 @@ def effective(cluster: NDArray[np.int64], correlation: float) -> float:
     return n / (1.0 + correlation * (float((sizes**2).sum()) / n - 1.0)) if n else 0.0
 
 
+def effective_pair(
+    was: NDArray[np.int64], now: NDArray[np.int64], correlation: float
+) -> tuple[float, float]:
+    """How many independent logs two sets of logs are worth where they are compared.
+
+    What is peculiar to a robot cancels as far as it has the same part in both: the variance of the
+    difference of two means under a random effect of each robot is (1 - c) / n + (1 - c) / m + c S,
+    with S the sum over robots of the squared difference of their parts. S is shared out by the sums
+    of squared parts, so that sets without a robot in common count as in `effective`; none counts
+    for more than it has logs.
+
+    Args:
+        was: (N,) robots of one set, N > 0.
+        now: (M,) of the other, M > 0.
+        correlation: of the outcome that is compared.
+    """
+    robots, index = np.unique(np.append(was, now), return_inverse=True)
+    parts = [
+        np.bincount(rows, minlength=len(robots)) / len(rows) for rows in np.split(index, [len(was)])
+    ]
+    squares = [float((part**2).sum()) for part in parts]
+    apart = float(((parts[0] - parts[1]) ** 2).sum()) / sum(squares)
+    one, other = (
+        1.0 / max(1.0 / n, (1.0 - correlation) / n + correlation * square * apart)
+        for n, square in zip((len(was), len(now)), squares, strict=True)
+    )
+    return one, other
+
+
 def dispersion(events: se2.Array, expected: se2.Array, parameters: int) -> float:
     """Variance of counts (K,) over that of Poisson's, at least 1: Pearson's chi2 per freedom.
 

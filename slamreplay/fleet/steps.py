@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from slamreplay.fleet.answers import Share, Step
 from slamreplay.fleet.counted import MEASURES, Counted, groups
-from slamreplay.fleet.intervals import newcombe
+from slamreplay.fleet.intervals import effective_pair, newcombe
 from slamreplay.fleet.verdicts import Alike
 
 
@@ -18,7 +18,8 @@ def steps(logs: Counted, alike: Alike) -> tuple[Step, ...]:
     """Every measure over every pair of versions that follow each other, by pair, measure.
 
     Only sites that ran both versions are compared: another site is another world. Within these the
-    mix of sites may still differ. Many intervals of 95 % are read at once: one in twenty is wrong.
+    mix of sites may still differ. What is peculiar to a robot counts as far as it did not run both
+    alike. Many intervals of 95 % are read at once: one in twenty is wrong.
     """
     rows = {name: found for name, found in groups(logs.texts["software"]) if name is not None}
     since = {name: logs.start_ns[found[logs.ordered[found]]] for name, found in rows.items()}
@@ -49,20 +50,21 @@ def _between(
         was, now = alike.share(measure, was_rows), alike.share(measure, now_rows)
         if measure in kinds and not was.count + now.count:
             continue
-        low, high = _difference(alike, measure, (was, was_rows), (now, now_rows))
+        low, high = _difference(logs, alike, measure, (was, was_rows), (now, now_rows))
         yield Step(before[0], after[0], measure, was, now, low, high, len(both), robots)
 
 
 def _difference(
+    logs: Counted,
     alike: Alike,
     measure: str,
     was: tuple[Share, NDArray[np.int64]],
     now: tuple[Share, NDArray[np.int64]],
 ) -> tuple[float | None, float | None]:
-    told = alike.outcome(measure)[0]
-    ends = []
-    for share, rows in (was, now):
-        if share.value is None:
-            return None, None
-        ends.append((share.value, alike.worth(measure, rows[told[rows]])))
-    return newcombe(ends[0], ends[1])
+    p, q = was[0].value, now[0].value
+    if p is None or q is None:
+        return None, None
+    told, _, correlation = alike.outcome(measure)
+    one, other = (logs.cluster[rows[told[rows]]] for rows in (was[1], now[1]))
+    n, m = effective_pair(one, other, correlation)
+    return newcombe((p, n), (q, m))
