@@ -13,6 +13,7 @@ from slamreplay.fleet.page.groups import GroupTable, group_table, step_table
 from slamreplay.fleet.page.links import Reports
 from slamreplay.fleet.page.map_image import MapImage
 from slamreplay.fleet.page.site_maps import MOST_MAPS, SiteMap, by_trouble, site_maps
+from slamreplay.fleet.queries import Query, queries, views
 from slamreplay.report.cells import Table, table
 from slamreplay.report.timeline import HATCHES
 from slamreplay.version import __version__
@@ -21,9 +22,6 @@ from slamreplay.version import __version__
 _MOST_DAYS = 42
 #: Up to here logs of one robot are as different as those of several.
 _HARDLY_ALIKE = 1.05
-#: Names of the queries that stand under the page's answers.
-QUERIES = ("areas", "picks", "places", "causes", "steps", "software", "robot", "site",
-           "map_version", "day", "gate", "failed")  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -72,7 +70,8 @@ class FleetView:
     copies: Table
     remarks: tuple[str, ...]
     alike: str
-    sql: Mapping[str, str]
+    sql: Mapping[str, Query]
+    views: str
 
 
 def versions_drawn(answers: Answers) -> tuple[str, ...]:
@@ -82,13 +81,12 @@ def versions_drawn(answers: Answers) -> tuple[str, ...]:
     return tuple(dict.fromkeys([*(a.map_version for a in areas), *(m.map_version for m in maps)]))
 
 
-def view_of(answers: Answers, images: Mapping[str, MapImage], sql: Mapping[str, str]) -> FleetView:
+def view_of(answers: Answers, images: Mapping[str, MapImage]) -> FleetView:
     """The page of a fleet.
 
     Args:
         answers: of its tables.
         images: by map version, of `versions_drawn`, those that are there.
-        sql: by name, the query that gives the same.
     """
     total, reports = answers.total, Reports(answers)
     named = {version: (f"map-{k}", image) for k, (version, image) in enumerate(images.items())}
@@ -141,7 +139,8 @@ def view_of(answers: Answers, images: Mapping[str, MapImage], sql: Mapping[str, 
         copies=logs.copies(answers.copies),
         remarks=answers.remarks,
         alike=f"{answers.alike:.1f}" if answers.alike > _HARDLY_ALIKE else "",
-        sql={name: sql.get(name, "") for name in QUERIES},
+        sql={query.name: query for query in queries()},
+        views=views(),
     )
 
 
