@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 from slamreplay.fleet.answers import Dimension, Group, Share, Step
@@ -35,9 +35,10 @@ class Number:
 
 @dataclass(frozen=True)
 class Row:
-    """One robot, site or the like."""
+    """One robot, site or the like; `aside` is a smaller line under its name."""
 
     name: str
+    aside: str
     bar: tuple[Piece, ...]
     bar_alt: str
     numbers: tuple[Number, ...]
@@ -62,8 +63,12 @@ class GroupTable:
     more: str
 
 
-def group_table(what: Dimension, groups: Sequence[Group]) -> GroupTable:
-    """The table of one dimension."""
+def group_table(
+    what: Dimension,
+    groups: Sequence[Group],
+    asides: Mapping[str | None, str] | None = None,
+) -> GroupTable:
+    """The table of one dimension; `asides` are smaller lines under names."""
     order: Callable[[Group], tuple[object, ...]] = (
         _newest_last if what in ("day", "software") else _worst_last
     )
@@ -73,8 +78,9 @@ def group_table(what: Dimension, groups: Sequence[Group]) -> GroupTable:
     one, many = NOUNS[what]
     how = "older" if what in ("day", "software") else "less troubled"
     more = f"{words.count(left, one, many)} more, {how} than these." if left else ""
+    rows = tuple(_row(what, group, (asides or {}).get(group.name, "")) for group in shown)
     head = ("logs", "lost", "times lost per km", "time lost", "map changed", "stops")
-    return GroupTable(what, one, head, tuple(_row(what, group) for group in shown), more)
+    return GroupTable(what, one, head, rows, more)
 
 
 def _worst_last(group: Group) -> tuple[float, float, int, str]:
@@ -87,13 +93,14 @@ def _newest_last(group: Group) -> tuple[str, str]:
     return (words.day(group.first_day) if group.name else "", group.name or "")
 
 
-def _row(what: Dimension, group: Group) -> Row:
+def _row(what: Dimension, group: Group, aside: str) -> Row:
     name = words.map_name(group.name) if what == "map_version" else words.label(group.name)
     failed = f"{group.failed:,} failed" if group.failed else ""
     rate = group.lost_per_km
     time_lost = group.lost_h / group.judged_h if group.judged_h else None
     return Row(
         name,
+        aside,
         pieces(group.states),
         in_words(group.states),
         (
@@ -128,7 +135,8 @@ def _by(value: float | None) -> str:
 def step_table(steps: Sequence[Step]) -> Table:
     """What changed from one software version to the next: what got worse and is newest first."""
     rank = {"worse": 0, "better": 1, "not told apart": 2}
-    newest_first = steps[::-1]
+    changes = list(dict.fromkeys((step.before, step.after) for step in steps))
+    counted = [step for step in steps if step.was.n and step.now.n]
     rows = [
         (
             f"{step.before} to {step.after}",
@@ -139,7 +147,10 @@ def step_table(steps: Sequence[Step]) -> Table:
             step.verdict,
             Cell(words.count(step.sites, "site"), words.count(step.robots, "robot")),
         )
-        for step in sorted(newest_first, key=lambda one: rank[one.verdict])
+        for step in sorted(
+            counted,
+            key=lambda one: (rank[one.verdict], -changes.index((one.before, one.after))),
+        )
     ]
     head = ("change", "measure", "before", "after", "difference", "verdict", "over")
     return table(head, rows, "the query's answer")

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 from slamreplay.evidence.words import FAILURE_MODES, STATES
 from slamreplay.fleet.answers import Cause, Copies, Failure, Pick
 from slamreplay.fleet.page import words
+from slamreplay.fleet.page.bars import Piece
 from slamreplay.fleet.page.links import Link, Reports, short_name
 from slamreplay.report.cells import Cell, Table, table
 
 #: Rows of each list.
-MOST_PICKS, MOST_CAUSES = 20, 12
+MOST_PICKS, MOST_ALIKE, MOST_CAUSES = 20, 3, 12
 _IN_ANSWER = "the query's answer"
 
 
@@ -30,10 +32,11 @@ class PickRow:
 
 @dataclass(frozen=True)
 class CauseRow:
-    """A cause with the length of its bar in per cent of the longest, and its numbers."""
+    """A cause with a bar of the time that it cost, by the longest one, and its numbers."""
 
     name: str
-    size: float
+    bar: tuple[Piece, ...]
+    bar_alt: str
     lost: str
     logs: str
     where: str
@@ -42,28 +45,41 @@ class CauseRow:
 
 
 def picks(all_picks: Sequence[Pick], reports: Reports) -> tuple[PickRow, ...]:
-    """The first ones."""
+    """The first ones; of logs of one kind at one site no more than `MOST_ALIKE`."""
+    met: Counter[tuple[str, str | None]] = Counter()
+    shown = []
+    for pick in all_picks:
+        met[pick.kind, pick.site] += 1
+        if met[pick.kind, pick.site] <= MOST_ALIKE:
+            shown.append(pick)
     return tuple(
         PickRow(
             reports.to(pick.key, short_name(pick.log), pick.report),
             ", ".join((words.label(pick.site), words.label(pick.robot), words.day(pick.day))),
             pick.state or "insufficient_data",
             STATES[pick.state].name if pick.state else "Failed",
-            pick.reason,
+            _reason(pick),
             "" if pick.alike < 2 else f"{pick.alike:,} alike",
         )
-        for pick in all_picks[:MOST_PICKS]
+        for pick in shown[:MOST_PICKS]
     )
 
 
+def _reason(pick: Pick) -> str:
+    kind = FAILURE_MODES.get(pick.kind)
+    text = pick.reason if kind is None else f"{kind}: {pick.reason}"
+    return f"{text[:1].upper()}{text[1:]}"
+
+
 def causes(all_causes: Sequence[Cause], reports: Reports) -> tuple[CauseRow, ...]:
-    """What cost most hours first."""
+    """What cost the most hours of lost robots first."""
     shown = all_causes[:MOST_CAUSES]
     longest = max((cause.lost_h + cause.changed_h for cause in shown), default=0.0) or 1.0
     return tuple(
         CauseRow(
             FAILURE_MODES.get(cause.kind, cause.kind.replace("_", " ")),
-            round(100.0 * (cause.lost_h + cause.changed_h) / longest, 2),
+            _bar(cause, longest),
+            f"{words.hours(cause.lost_h)} lost, {words.hours(cause.changed_h)} in a changed map",
             f"{words.hours(cause.lost_h)} lost, {words.hours(cause.changed_h)} in a changed map, "
             f"{words.count(cause.stops, 'stop')}",
             words.count(cause.logs, "log"),
@@ -73,6 +89,15 @@ def causes(all_causes: Sequence[Cause], reports: Reports) -> tuple[CauseRow, ...
         )
         for cause in shown
     )
+
+
+def _bar(cause: Cause, longest: float) -> tuple[Piece, ...]:
+    lost, changed = (round(100.0 * h / longest, 2) for h in (cause.lost_h, cause.changed_h))
+    both = (
+        Piece("lost", 0.0, lost, f"lost for {words.hours(cause.lost_h)}"),
+        Piece("map_changed", lost, changed, f"map changed for {words.hours(cause.changed_h)}"),
+    )
+    return tuple(piece for piece in both if piece.size)
 
 
 def failures(all_failures: Sequence[Failure]) -> Table:

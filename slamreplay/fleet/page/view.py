@@ -13,15 +13,15 @@ from slamreplay.fleet.page.groups import GroupTable, group_table, step_table
 from slamreplay.fleet.page.links import Reports
 from slamreplay.fleet.page.map_image import MapImage
 from slamreplay.fleet.page.site_maps import MOST_MAPS, SiteMap, by_trouble, site_maps
+from slamreplay.fleet.queries import Query, queries, views
 from slamreplay.report.cells import Table, table
 from slamreplay.report.timeline import HATCHES
 from slamreplay.version import __version__
 
 #: Days of the trend; what is older is in the table of days, as far as that goes.
 _MOST_DAYS = 42
-#: Names of the queries that stand under the page's answers.
-QUERIES = ("areas", "picks", "places", "causes", "steps", "software", "robot", "site",
-           "map_version", "day", "gate", "failed")  # fmt: skip
+#: Up to here logs of one robot are as different as those of several.
+_HARDLY_ALIKE = 1.05
 
 
 @dataclass(frozen=True)
@@ -70,7 +70,8 @@ class FleetView:
     copies: Table
     remarks: tuple[str, ...]
     alike: str
-    sql: Mapping[str, str]
+    sql: Mapping[str, Query]
+    views: str
 
 
 def versions_drawn(answers: Answers) -> tuple[str, ...]:
@@ -80,19 +81,20 @@ def versions_drawn(answers: Answers) -> tuple[str, ...]:
     return tuple(dict.fromkeys([*(a.map_version for a in areas), *(m.map_version for m in maps)]))
 
 
-def view_of(answers: Answers, images: Mapping[str, MapImage], sql: Mapping[str, str]) -> FleetView:
+def view_of(answers: Answers, images: Mapping[str, MapImage]) -> FleetView:
     """The page of a fleet.
 
     Args:
         answers: of its tables.
         images: by map version, of `versions_drawn`, those that are there.
-        sql: by name, the query that gives the same.
     """
     total, reports = answers.total, Reports(answers)
     named = {version: (f"map-{k}", image) for k, (version, image) in enumerate(images.items())}
     needed, maps = remap.needed(answers.areas), by_trouble(answers.maps)
     cards = remap.cards(needed, answers.maps, named, reports)
     others = (*needed[remap.MOST_CARDS :], *(a for a in answers.areas if a.advice != "re-map"))
+    sites: dict[str | None, str] = {one.map_version: words.label(one.site) for one in answers.maps}
+    picks = logs.picks(answers.picks, reports)
     days = [(g.name, g.states) for g in answers.by["day"] if g.name is not None]
     return FleetView(
         version=__version__,
@@ -120,14 +122,15 @@ def view_of(answers: Answers, images: Mapping[str, MapImage], sql: Mapping[str, 
         cards=cards,
         cards_more=len(needed) - len(cards),
         areas=remap.rest(others, reports),
-        picks=logs.picks(answers.picks, reports),
-        picks_more=max(len(answers.picks) - logs.MOST_PICKS, 0),
+        picks=picks,
+        picks_more=len(answers.picks) - len(picks),
         maps=site_maps(maps, named),
         maps_more=max(len(maps) - MOST_MAPS, 0),
         causes=logs.causes(answers.causes, reports),
         steps=step_table(answers.steps),
         groups=tuple(
-            group_table(what, answers.by[what]) for what in ("robot", "site", "map_version", "day")
+            group_table(what, answers.by[what], sites if what == "map_version" else None)
+            for what in ("robot", "site", "map_version", "day")
         ),
         software=group_table("software", answers.by["software"]),
         gate_rows=_gate(answers),
@@ -135,8 +138,9 @@ def view_of(answers: Answers, images: Mapping[str, MapImage], sql: Mapping[str, 
         failures=logs.failures(answers.failures),
         copies=logs.copies(answers.copies),
         remarks=answers.remarks,
-        alike=f"{answers.alike:.1f}",
-        sql={name: sql.get(name, "") for name in QUERIES},
+        alike=f"{answers.alike:.1f}" if answers.alike > _HARDLY_ALIKE else "",
+        sql={query.name: query for query in queries()},
+        views=views(),
     )
 
 

@@ -1,4 +1,4 @@
-"""The fleet's page on disk."""
+"""The fleet's page on disk, and its questions as SQL beside it."""
 
 from __future__ import annotations
 
@@ -12,15 +12,16 @@ from slamreplay.fleet.answers import Answers
 from slamreplay.fleet.page.html import fleet_html
 from slamreplay.fleet.page.map_image import MapImage, map_image
 from slamreplay.fleet.page.view import versions_drawn, view_of
+from slamreplay.fleet.queries import queries_sql
 from slamreplay.maps.map_server import read_map
 
-PAGE_FILE = "fleet.html"
+PAGE_FILE, QUERIES_FILE = "fleet.html", "queries.sql"
 
 
 def write_fleet_page(
     folder: Path, answers: Answers | None = None, *, warn: Callable[[str], None] | None = None
 ) -> Path:
-    """Write fleet.html into a batch's folder; it is whole, or stays as it was.
+    """Write fleet.html and queries.sql into a batch's folder; each is whole, or stays as it was.
 
     Args:
         folder: of the batch; its `maps` are drawn, and its reports linked.
@@ -28,7 +29,7 @@ def write_fleet_page(
         warn: told in one line of each map that cannot be read.
 
     Returns:
-        Its path.
+        The path of fleet.html.
 
     Raises:
         OutputError: the place cannot be written.
@@ -36,8 +37,9 @@ def write_fleet_page(
     if answers is None:
         answers = answers_of(folder)
     images = _images(folder, versions_drawn(answers), warn or (lambda _line: None))
+    write_file(folder / QUERIES_FILE, queries_sql(folder).encode())
     target = folder / PAGE_FILE
-    write_file(target, fleet_html(view_of(answers, images, {})).encode())
+    write_file(target, fleet_html(view_of(answers, images)).encode())
     return target
 
 
