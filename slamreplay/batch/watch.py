@@ -138,7 +138,7 @@ def watch(
     with batch_folder(target) as scratch, serve(scratch) as look_back:
         rounds = _Rounds(
             target, settling, task_of, look_back, pace, tell, finished, tally, sleep,
-            done=set(fates(target)),
+            done=set(fates(target, tell)),
         )  # fmt: skip
         is_first = True
         while True:
@@ -254,7 +254,7 @@ class _Rounds:
         if result.error is not None and is_passing(result.error):
             self._put_off(source, result.error)
             return
-        self.written(lambda: commit_result(self.target, result))
+        self.written(lambda: commit_result(self.target, result, self.tell))
         self.done.add(result.key)
         if not is_other:
             self.settling.take(source)
