@@ -28,7 +28,7 @@ from slamreplay.consistency.statistics.mean_test import N_EFF_MIN, NOMINAL
 from slamreplay.geometry.se2 import Array
 
 #: Independent samples for each cosine.
-_PER_COSINE = 4
+_PER_COSINE = 3
 #: Groups that a correlation is estimated from at least.
 _GROUPS_MIN = 12
 #: Runs of seeds, and logs of a gate, that a mean over them takes: each is independent of the rest.
