@@ -34,6 +34,7 @@ from slamreplay.gate.baseline_metrics import is_worse, margin_of
 from slamreplay.gate.measures import Measure, Measures, Series
 from slamreplay.gate.outcome import Outcome
 from slamreplay.gate.rules import BaselineRules
+from slamreplay.recipes import read_recipe
 
 S = 1_000_000_000
 RULES = BaselineRules()
@@ -313,20 +314,33 @@ def test_a_difference_within_the_margin_passes_unless_the_recipe_says_otherwise(
     assert outcome(compare(base, now, strict), "a", "error_mean_m").status == "failed"
 
 
-def test_noise_passes_and_a_log_that_is_one_event_is_insufficient(tmp_path):
+def test_noise_passes(tmp_path):
     base = stored(tmp_path, {"a": log(blocks=0.1 + noise(1, sigma=0.1))})
     found = compare(base, {"a": log(blocks=0.1 + noise(2, sigma=0.1))}, RULES)
     assert "no difference that is sure" in outcome(found, "a", "error_mean_m").message
-    burst = 0.1 + noise(1, sigma=0.001) + np.where(np.arange(60) > 30, 1.0, 0.0)
-    found = outcome(compare(base, {"a": log(blocks=burst)}, RULES), "a", "error_mean_m")
+
+
+@pytest.mark.parametrize(
+    ("size", "gross", "status"),
+    [(0.1, 5.0, "skipped"), (1.0, 5.0, "failed"), (1.0, None, "skipped"), (-1.0, 5.0, "skipped")],
+)
+def test_what_happened_once_proves_nothing_unless_it_is_gross(tmp_path, size, gross, status):
+    base = stored(tmp_path, {"a": log(blocks=0.1 + noise(1, sigma=0.001))})
+    once = 0.1 + noise(1, sigma=0.001) + np.where(np.arange(60) > 30, size, 0.0)
+    rules = BaselineRules(gross=gross)
+    found = outcome(compare(base, {"a": log(blocks=once)}, rules), "a", "error_mean_m")
+    assert found.status == status
+    assert "60 blocks are worth" in found.message
+    assert ("a fact of this log" in found.message) == (status == "failed")
+    # Of another log it is no fact.
+    found = outcome(compare(base, {"a": log("cd", blocks=once)}, rules), "a", "error_mean_m")
     assert found.status == "skipped"
-    assert "insufficient: 60 blocks are worth" in found.message
 
 
 def test_a_small_worsening_of_all_logs_is_found_that_none_shows_alone(tmp_path):
     old = {f"{k}": log(blocks=0.2 + noise(k, sigma=0.15)) for k in range(10)}
     worse = {f"{k}": log(blocks=0.26 + noise(50 + k, sigma=0.15)) for k in range(10)}
-    found = compare(stored(tmp_path, old), worse, RULES)
+    found = compare(stored(tmp_path, old), worse, BaselineRules(gross=None))
     assert all(outcome(found, f"{k}", "error_mean_m").status != "failed" for k in range(10))
     assert outcome(found, ALL_LOGS, "error_mean_m").status == "failed"
     few = {name: worse[name] for name in "012"}
@@ -414,6 +428,15 @@ def test_nees_is_worse_the_farther_it_is_from_its_degrees_of_freedom():
     assert is_worse("match_mean", 0.8, 0.7)
     assert margin_of("nees_mean", 30.0, RULES) == pytest.approx(6.0)
     assert margin_of("amcl.error_max_m", 1.0, BaselineRules(margins={"amcl.error_max_m": 1})) == 1
+
+
+@pytest.mark.parametrize(
+    ("text", "gross"), [("{}", 5.0), ("{gross: 2}", 2.0), ("{gross: null}", None)]
+)
+def test_a_recipe_says_what_is_gross(tmp_path, text, gross):
+    path = tmp_path / "gate.yaml"
+    path.write_text(f"version: 1\nquestion: as before?\nlimits: {{jumps: 1}}\nbaseline: {text}\n")
+    assert read_recipe(path).demands.baseline.gross == gross
 
 
 @given(st.lists(st.floats(-1e6, 1e6), max_size=40), st.lists(st.floats(-1e6, 1e6), max_size=40))

@@ -59,6 +59,7 @@ class BaselinePart(Strict):
 
     alpha: Annotated[float, Field(gt=0.0, le=0.1)] = BaselineRules.alpha
     margins: dict[str, Annotated[float, Field(ge=0.0)]] = Field(default_factory=dict)
+    gross: Annotated[float, Field(ge=1.0, le=1e6)] | None = BaselineRules.gross
 
 
 class GateFile(RulesPart):
@@ -119,7 +120,7 @@ def gate_recipe(given: Mapping[str, Any], path: Path) -> GateRecipe:
         )
     for name in file.baseline.margins:
         _at("baseline.margins", path, _check_compared, name, estimators)
-    baseline = BaselineRules(file.baseline.alpha, file.baseline.margins)
+    baseline = BaselineRules(file.baseline.alpha, file.baseline.margins, file.baseline.gross)
     demands = Demands(file.question, top, of_logs, estimators, file.seeds, baseline)
     return GateRecipe(demands)
 
