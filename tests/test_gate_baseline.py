@@ -221,6 +221,19 @@ def test_over_units_is_students_test_and_near_the_permutation_of_signs_and_wilco
     assert ours.p_value == pytest.approx(stats.wilcoxon(new - old).pvalue, rel=1.0)
 
 
+def test_numbers_that_scatter_in_proportion_are_tested_by_their_ratios():
+    rng = np.random.default_rng(6)
+    old = 0.1 * np.exp(0.2 * rng.standard_normal(8))
+    new = 3.0 * old * np.exp(0.3 * rng.standard_normal(8))
+    new[2] *= 20.0  # one run went far astray
+    ours = over_units(old, new, by_ratio=True)
+    assert ours.p_value == pytest.approx(stats.ttest_rel(np.log(new), np.log(old)).pvalue)
+    assert ours.p_value < over_units(old, new).p_value / 20
+    assert ours.mean == pytest.approx(np.mean(new - old))
+    zero = np.append(old[:-1], 0.0)
+    assert over_units(zero, new, by_ratio=True) == over_units(zero, new)
+
+
 def test_unpaired_independent_blocks_are_nearly_welchs_test():
     rng = np.random.default_rng(7)
     old, new = rng.normal(0.0, 1.0, 100), rng.normal(0.6, 2.0, 120)

@@ -115,7 +115,7 @@ def whole_runs(runs: int, seed: int) -> None:
     """A run of the gate over ten logs and eight numbers: how often anything fails."""
     margins = dict.fromkeys((*MEAN_OF.values(), *SEEDED), 0.0)
     print(f"\nRuns of a gate, {LOGS} logs by {len(SERIES) + len(SEEDED)} numbers, {runs} runs per"
-          " row: runs with an alarm, percent (margins 0, gross none; then the defaults)\n")  # fmt: skip
+          " row: runs with an alarm, % (margins 0, gross none; then defaults)\n")  # fmt: skip
     print("| rho | alpha 5 % | alpha 0.1 % | defaults | textbook 5 % | textbook 0.1 %"
           " | by eye, 10 % |\n|---|---|---|---|---|---|---|")  # fmt: skip
     for rho in RHO:
