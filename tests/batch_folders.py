@@ -37,13 +37,13 @@ def start(*arguments, **how):
     return subprocess.Popen(command, start_new_session=True, **{**pipes, **how})
 
 
-def finished(program, timeout=120):
+def finished(program, timeout=300):
     """Exit code, stdout and stderr."""
     out, err = program.communicate(timeout=timeout)
     return program.returncode, out, err
 
 
-def wait_until(true, timeout=60):
+def wait_until(true, timeout=120):
     """Look until it is so."""
     end = time.monotonic() + timeout
     while not true():

@@ -23,7 +23,7 @@ files = st.builds(
 )
 sources = st.builds(
     LogSource, log=st.just("log"), files=st.tuples(files),
-    labels=st.dictionaries(texts, texts, max_size=2), robot=st.none() | texts,
+    robot=st.none() | texts,
     folder=texts,
 )  # fmt: skip
 rules = st.builds(

@@ -1,6 +1,7 @@
 """Workers, clients and schedulers that are killed: nothing is lost, and nothing is there twice."""
 
 import json
+import signal
 from contextlib import ExitStack
 
 import pytest
@@ -62,17 +63,24 @@ def cluster(tmp_path):
         yield cluster
 
 
-def test_a_killed_scheduler_loses_nothing_and_a_log_that_kills_workers_stops_no_other(
+def test_a_stopped_client_a_killed_scheduler_and_a_log_that_kills_workers_lose_nothing(
     cluster, tmp_path
 ):
     logs, target = tmp_path / "logs", tmp_path / "batch"
     logs.mkdir()
-    for name in ["a.mcap", "b.mcap", "c_poison.mcap", "d.mcap", "e.mcap", "f.mcap"]:
+    for name in ["a.mcap", "b.mcap", "c.mcap", "d.mcap", "e_poison.mcap", "f.mcap", "g.mcap"]:
         (logs / name).write_bytes(name.encode())
     command = ("batch", logs, "-o", target, "--scheduler", cluster.address, "--json")
     cluster.begin()
-    program = start(*command)
+    stopped = start(*command)
     wait_until(lambda: committed(target) >= 1)
+    stopped.send_signal(signal.SIGINT)
+    code, out, err = finished(stopped)
+    assert (code, out) == (130, "")
+    assert err == f"stopped; what is done is kept in {target}: the same command again goes on\n"
+    cluster.begin()
+    program = start(*command)
+    wait_until(lambda: committed(target) >= 3)
     cluster.kill(cluster.scheduler)
     cluster.end()
 
@@ -81,8 +89,8 @@ def test_a_killed_scheduler_loses_nothing_and_a_log_that_kills_workers_stops_no_
     code, out, err = finished(program)
     assert (code, err) == (0, "")
     told = json.loads(out)
-    assert told["states"] == {"healthy": 5}
+    assert told["states"] == {"healthy": 6}
     ((failed),) = told["failed"]
-    assert failed["log"].endswith("c_poison.mcap")
+    assert failed["log"].endswith("e_poison.mcap")
     assert failed["error"].startswith("its worker died 3 times (hint: it may need more memory")
-    check_whole(target, done=5, failed=1)
+    check_whole(target, done=6, failed=1)

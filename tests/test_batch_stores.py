@@ -1,13 +1,11 @@
 """Logs in buckets and behind web servers: listed, fetched, and every refusal in one line."""
 
-import http.server
 import os
 import socket
-import threading
-from contextlib import closing, contextmanager
-from functools import partial
+from contextlib import closing
 
 import pytest
+from batch_site import Site, served
 
 from slamreplay.batch import stores
 from slamreplay.batch.addresses import shown, without_secrets
@@ -170,36 +168,6 @@ def test_a_missing_package_is_one_line_with_the_extra(monkeypatch):
         sources_of(["nope://logs"])
 
 
-class _Site(http.server.SimpleHTTPRequestHandler):
-    """A folder with index pages; what the test's `answers` hold by path goes first."""
-
-    answers: dict = {}  # noqa: RUF012
-
-    def log_message(self, *_args):
-        pass
-
-    def do_GET(self):
-        statuses = self.answers.get(self.path.partition("?")[0], [])
-        if statuses and self.command == "GET":
-            self.send_error(statuses.pop(0))
-            return
-        super().do_GET()
-
-
-@contextmanager
-def _served(folder):
-    handler = partial(_Site, directory=str(folder))
-    server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler)
-    thread = threading.Thread(target=server.serve_forever, args=(0.05,))
-    thread.start()
-    try:
-        yield f"http://127.0.0.1:{server.server_port}"
-    finally:
-        server.shutdown()
-        thread.join()
-        server.server_close()
-
-
 @pytest.fixture(scope="module")
 def site(tmp_path_factory):
     folder = tmp_path_factory.mktemp("site")
@@ -207,7 +175,7 @@ def site(tmp_path_factory):
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         (folder / name).write_bytes(content)
     (folder / "list.jsonl").write_text('{"log": "old/x.mcap", "site": "n"}\n{"log": "gone.bag"}\n')
-    with _served(folder) as address:
+    with served(folder) as address:
         yield address, folder
 
 
@@ -241,15 +209,15 @@ def test_a_passing_failure_is_tried_again_a_lasting_one_is_not(site, tmp_path, m
     address, _ = site
     (source,) = sources_of([f"{address}/old/x.mcap"])
     waits = []
-    monkeypatch.setitem(_Site.answers, "/old/x.mcap", [503, 502])
+    monkeypatch.setitem(Site.answers, "/old/x.mcap", [503, 502])
     (path,) = fetch(source, {}, tmp_path, wait=waits.append)
     assert path.read_bytes() == b"x"
     assert waits == [0.5, 1.0]
-    monkeypatch.setitem(_Site.answers, "/old/x.mcap", [500] * 9)
+    monkeypatch.setitem(Site.answers, "/old/x.mcap", [500] * 9)
     with pytest.raises(LogError, match=r"^http://.*/old/x.mcap: the server answers 500$"):
         fetch(source, {}, tmp_path, wait=waits.append)
     assert waits == [0.5, 1.0, 0.5, 1.0, 2.0]
-    monkeypatch.setitem(_Site.answers, "/old/x.mcap", [403])
+    monkeypatch.setitem(Site.answers, "/old/x.mcap", [403])
     with pytest.raises(LogError, match="access denied"):
         fetch(source, {}, tmp_path, wait=waits.append)
     assert len(waits) == 5

@@ -277,9 +277,11 @@ def test_a_place_that_stays_wrong_is_no_area_with_one_that_was_found_right_again
         logs.append(log_row(f"{k}", start_ns=DAY0 + k * HOUR, robot=f"r{k % 2}"))
         places.append(place_row(f"{k}", 0, 0, contradicted_m2=0.3))
         places.append(place_row(f"{k}", 1, 0, contradicted_m2=0.3 if k == 1 else 0.0))
+        # Its edge is seen by some, and is of it.
+        places.append(place_row(f"{k}", 0, 1, contradicted_m2=0.1 if k in (2, 3) else 0.0))
     commit(tmp_path, tables(logs=logs, places=places))
     stays, went = answers(tmp_path).areas
-    assert (stays.advice, stays.box_m) == ("re-map", (0.0, 0.0, 1.0, 1.0))
+    assert (stays.advice, stays.box_m) == ("re-map", (0.0, 0.0, 1.0, 2.0))
     assert (went.advice, went.box_m) == ("temporary", (1.0, 0.0, 2.0, 1.0))
 
 

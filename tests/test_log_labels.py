@@ -7,8 +7,10 @@ from pathlib import Path
 
 import pytest
 
+from slamreplay.batch.keys import task_of
 from slamreplay.batch.labels import labels_of
 from slamreplay.batch.sources import sources_of
+from slamreplay.batch.worker import look_back
 from slamreplay.cli.simulate import _simulate
 from slamreplay.errors import OutputError, UsageError
 from slamreplay.ingest.labels import log_labels
@@ -135,6 +137,14 @@ def test_the_table_holds_against_the_log_and_the_namespace_fills_in(tmp_path):
     assert labels_of(said, path)["robot"] == "9"
     alone = replace(source, robot="/tb3")
     assert labels_of(alone, SAMPLES / "healthy_short.bag")["robot"] == "tb3"
+
+
+def test_a_log_that_cannot_be_judged_bears_its_labels_all_the_same(tmp_path):
+    (source,) = sources_of([str(_write(tmp_path / "a.mcap"))])
+    result = look_back(task_of(replace(source, labels={"site": "told"})), tmp_path)
+    assert result.error is not None
+    (row,) = result.tables["logs"].to_pylist()
+    assert (row["site"], row["robot"], row["software"]) == ("told", "amr-07", "2.3.1")
 
 
 def test_the_command_takes_labels_and_refuses_what_are_none(tmp_path, monkeypatch, capsys):

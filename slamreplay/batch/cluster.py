@@ -8,6 +8,7 @@ import platform
 import re
 import signal
 import sys
+import warnings
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager, ExitStack, contextmanager, suppress
 from dataclasses import dataclass
@@ -300,7 +301,9 @@ def _quiet() -> Iterator[None]:
     for logger in loggers:
         logger.disabled = True
     try:
-        yield
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of other versions it warns; we refuse them
+            yield
     finally:
         for logger, was in zip(loggers, before, strict=True):
             logger.disabled = was

@@ -71,16 +71,15 @@ def key_of(
     """32 hex digits over all that the answer depends on but the program itself.
 
     That is: address (without passwords and signatures), name, size and version of each file; the
-    robot and the labels; the content, not the place, of the map and the topics file; `cause`; the
-    demands. Two batches of months apart go on where one ended though the program is newer: which
-    version judged a log stands in its row. Options of the store are left out: they say how to get
-    in, not what is there.
+    robot; the content, not the place, of the map and the topics file; `cause`; the demands. Two
+    batches of months apart go on where one ended though the program is newer: which version judged
+    a log stands in its row. Options of the store are left out: they say how to get in, not what is
+    there. So are labels, on which no verdict depends: see `relabel`.
     """
     told = {
         "files": [[shown(f.url), f.name, f.size, f.version] for f in source.files],
         "folder": source.folder,
         "robot": source.robot,
-        "labels": sorted(source.labels.items()),
         "cause": cause,
         "demands": None if demands is None else _in_order(asdict(demands)),
         "named": sorted((n, _digest(c)) for n, c in (named or {}).items()),

@@ -13,6 +13,7 @@ from slamreplay.batch.cluster import Workers
 from slamreplay.batch.commit import Fate, Tell, commit_result, fate_of, fates, silent
 from slamreplay.batch.folder import batch_folder
 from slamreplay.batch.loop import looked_back
+from slamreplay.batch.relabel import relabel
 from slamreplay.batch.task import LogTask
 from slamreplay.fleet.store import compact
 
@@ -63,7 +64,8 @@ def run_batch(
         workers: who does it.
         again_failed: try those again that failed before.
         progress: told how many are done, and the share done.
-        tell: told in a line what of the folder turned out to be damaged; its logs are done again.
+        tell: told in a line what of the folder turned out to be damaged, whose logs are done again,
+            and how many logs have other labels now.
 
     Raises:
         OutputError: the folder is somebody else's, in use, or cannot be written.
@@ -82,6 +84,9 @@ def run_batch(
         }
         todo = [task for task in tasks if task.key not in told]
         kept = len(told)
+        relabelled = relabel(target, [task for task in tasks if task.key in told])
+        if relabelled:
+            tell(f"{relabelled} logs that were there have other labels now")
         say = _Telling(todo, len(tasks), progress)
         say(told)
         with closing(looked_back(todo, workers, scratch)) as results:

@@ -47,7 +47,7 @@ def sources_of(
         tell: told in one sentence each what was skipped or of no use, with a count.
 
     Raises:
-        LogError: a place does not exist or cannot be read, `NoLogError` where there is no log at all.
+        LogError: a place does not exist or cannot be read; `NoLogError` where there is no log.
         UsageError: a place or a manifest that makes no sense.
     """
     found: dict[str, LogSource] = {}

@@ -19,6 +19,7 @@ from slamreplay.batch.cluster import Workers, kept_connected
 from slamreplay.batch.commit import commit_result, fates
 from slamreplay.batch.folder import batch_folder
 from slamreplay.batch.loop import looked_back
+from slamreplay.batch.relabel import relabel
 from slamreplay.batch.settling import Looked, Settling, is_there
 from slamreplay.batch.task import LogResult, LogSource, LogTask
 from slamreplay.errors import OutputError, SlamreplayError
@@ -89,6 +90,7 @@ class Tally:
         gate_failed: of them, those whose gate failed.
         lacking: logs that are not whole or cannot be tried now, with what they lack.
         moving: logs that are still written to.
+        relabelled: logs that were there and have other labels now.
     """
 
     finished: int = 0
@@ -96,6 +98,7 @@ class Tally:
     gate_failed: int = 0
     lacking: dict[str, str] = field(default_factory=dict)
     moving: int = 0
+    relabelled: int = 0
 
 
 def watch(
@@ -135,7 +138,7 @@ def watch(
     with batch_folder(target) as scratch, serve(scratch) as look_back:
         rounds = _Rounds(
             target, settling, task_of, look_back, pace, tell, finished, tally, sleep,
-            done=set(fates(target)),
+            done=set(fates(target, tell)),
         )  # fmt: skip
         is_first = True
         while True:
@@ -143,9 +146,9 @@ def watch(
             if looked is not None and pace.is_once and is_first and looked.moving:
                 sleep(settling.settle_s)
                 looked = rounds.looked(find, is_first=True)
-            kept = tally.finished
+            before = tally.finished, tally.relabelled
             has_more = looked is not None and rounds.play(looked, is_first=is_first)
-            if tally.finished > kept:
+            if (tally.finished, tally.relabelled) != before:
                 rounds.written(finish_round)
             if pace.is_once and not has_more:
                 return tally
@@ -195,6 +198,7 @@ class _Rounds:
     def play(self, looked: Looked, *, is_first: bool) -> bool:
         """One round; whether logs are left for the next one, without waiting."""
         todo: dict[str, tuple[LogTask, LogSource]] = {}
+        known: list[LogTask] = []
         for source in looked.ready:
             if len(todo) == self.pace.per_round:
                 break
@@ -207,8 +211,11 @@ class _Rounds:
                 continue
             if task.key in self.done:
                 self.settling.take(source)
+                known.append(task)
             else:
                 todo.setdefault(task.key, (task, source))
+        if known:
+            self.written(lambda: self._relabel(known))
         try:
             with closing(self.look_back([task for task, _ in todo.values()])) as results:
                 for result in results:
@@ -235,6 +242,9 @@ class _Rounds:
                 self._tell("write", "")
                 return
 
+    def _relabel(self, known: Sequence[LogTask]) -> None:
+        self.tally.relabelled += relabel(self.target, known)
+
     def _keep(self, result: LogResult, source: LogSource) -> None:
         is_other = not self.settling.still_is(source)
         if is_other and (is_there(source) or result.error is not None):
@@ -244,7 +254,7 @@ class _Rounds:
         if result.error is not None and is_passing(result.error):
             self._put_off(source, result.error)
             return
-        self.written(lambda: commit_result(self.target, result))
+        self.written(lambda: commit_result(self.target, result, self.tell))
         self.done.add(result.key)
         if not is_other:
             self.settling.take(source)

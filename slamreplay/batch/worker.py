@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from slamreplay.batch.fetch import fetch, fetched, local_log
 from slamreplay.batch.folder import report_folder
 from slamreplay.batch.task import LogResult, LogTask
 from slamreplay.errors import SlamreplayError, UsageError
@@ -69,11 +70,13 @@ def look_back(task: LogTask, scratch: Path | None = None) -> LogResult:
 
 def failed(task: LogTask, line: str, cost: Cost | None = None) -> LogResult:
     """The result of a log that could not be looked back on, with the line that says why."""
+    from slamreplay.batch.labels import labels_of
     from slamreplay.fleet.rows import failed_rows
 
-    source = task.source
+    # A client does not open what its workers died of.
+    labels = labels_of(task.source, None if cost is None else local_log(task.source))
     tables = dict(
-        failed_rows(line, key=task.key, log=source.log, bytes=_bytes_of(task), labels=source.labels)
+        failed_rows(line, key=task.key, log=task.source.log, bytes=_bytes_of(task), labels=labels)
     )
     if cost is not None:
         tables |= _costs(task.key, cost)
@@ -93,6 +96,7 @@ def line_of(error: BaseException) -> str:
 
 
 def _judged(task: LogTask, folder: Path, spent: Callable[[], Cost]) -> LogResult:
+    from slamreplay.batch.labels import labels_of
     from slamreplay.fleet.rows import rows_of
     from slamreplay.postmortem import postmortem
     from slamreplay.report.build import build
@@ -110,7 +114,7 @@ def _judged(task: LogTask, folder: Path, spent: Callable[[], Cost]) -> LogResult
             log=task.source.log,
             content=_content(post),
             bytes=_bytes_of(task),
-            labels=task.source.labels,
+            labels=labels_of(task.source, fetched(task.source, folder / _LOG)),
             gate=gate,
             report_folder=report_folder(task),
         )
@@ -120,7 +124,6 @@ def _judged(task: LogTask, folder: Path, spent: Callable[[], Cost]) -> LogResult
 
 
 def _evidence(task: LogTask, folder: Path) -> Bundle:
-    from slamreplay.batch.fetch import fetch
     from slamreplay.batch.named import placed
     from slamreplay.bundle.store import is_bundle
     from slamreplay.bundle.view import Bundle

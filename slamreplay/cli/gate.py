@@ -94,11 +94,12 @@ def gate(
     from slamreplay.cli.gate_run import MARKER, Gating, judged
     from slamreplay.cli.gate_shown import show_result
     from slamreplay.gate.baseline import read_baseline
+    from slamreplay.recipes import read_demands
 
     # All this before the work, not after it.
     if as_json and github:
         raise UsageError("--json and --github both print on stdout", hint="write the JSON by -o")
-    demands = _demands(recipe)
+    demands = read_demands(recipe)
     before = None if baseline is None else read_baseline(baseline)
     if output is not None:
         check_target(output, MARKER)
@@ -129,19 +130,6 @@ def gate(
         raise done.fault
     if done.result.exit_code:
         raise typer.Exit(done.result.exit_code)
-
-
-def _demands(path: Path) -> Demands:
-    from slamreplay.recipes import GateRecipe, read_recipe
-
-    recipe = read_recipe(path)
-    if not isinstance(recipe, GateRecipe):
-        raise UsageError(
-            "it is no gate: it has none of expect, forbid, max_severity, logs",
-            where=path,
-            hint=f"slamreplay perturb --recipe {path}",
-        )
-    return recipe.demands
 
 
 def _check_file(path: Path) -> None:

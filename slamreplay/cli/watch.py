@@ -12,7 +12,17 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from slamreplay.cli.batch import Cause, Count, MemoryLimit, Output, Scheduler
+from slamreplay.cli.batch import (
+    Cause,
+    Count,
+    Maps,
+    MemoryLimit,
+    Output,
+    Recipe,
+    Scheduler,
+    Storage,
+    read_demands,
+)
 from slamreplay.cli.options import Json
 from slamreplay.cli.terminal import complain, say_json
 from slamreplay.errors import LogError, UsageError
@@ -20,7 +30,6 @@ from slamreplay.errors import LogError, UsageError
 if TYPE_CHECKING:
     from slamreplay.batch.task import LogSource
     from slamreplay.batch.watch import Finished, Tally
-    from slamreplay.gate.rules import Demands
 
 _FAILED, _UNREADABLE, _INTERRUPTED, _TERMINATED = 1, 2, 130, 143
 #: So many logs are done between two looks; more, where many workers would wait for the last one.
@@ -32,19 +41,6 @@ _HOOK_S = 60.0
 
 Folder = Annotated[
     str, typer.Argument(metavar="DIR", help="Where logs come in: a folder or an address (s3://...)")
-]
-Recipe = Annotated[
-    Path | None, typer.Option("--recipe", metavar="YAML", help="Hold each log against this gate.")
-]
-Maps = Annotated[
-    str | None,
-    typer.Option(
-        "--maps", metavar="CSV", help="Which map and labels belong to which logs, by pattern."
-    ),
-]
-Storage = Annotated[
-    list[str] | None,
-    typer.Option("--storage", metavar="KEY=VALUE", help="Option of fsspec for addresses."),
 ]
 Every = Annotated[
     float, typer.Option("--every", metavar="S", min=0.1, help="Time between two looks, in s.")
@@ -114,7 +110,8 @@ def _watch(
     who = Workers(workers, memory_limit, scheduler).checked()
     _check_apart(folder, output)
     hook = _hook(on_finished)
-    demands, options = _demands(recipe), storage_options(storage or ())
+    demands = None if recipe is None else read_demands(recipe)
+    options = storage_options(storage or ())
     tell = _new_only(complain)
     per_round = _PER_ROUND if scheduler is None else _PER_ROUND_OF_CLUSTER
     tally = Tally()
@@ -184,17 +181,6 @@ def _new_only(tell: Callable[[str], None]) -> Callable[[str], None]:
             tell(line)
 
     return say
-
-
-def _demands(recipe: Path | None) -> Demands | None:
-    if recipe is None:
-        return None
-    from slamreplay.recipes import GateRecipe, read_recipe
-
-    read = read_recipe(recipe)
-    if not isinstance(read, GateRecipe):
-        raise UsageError("is no recipe of a gate", where=recipe, hint="see recipes/ci-gate")
-    return read.demands
 
 
 def _write_page(output: Path, tell: Callable[[str], None]) -> None:

@@ -1,8 +1,8 @@
 """Which parts of a map are no longer true, and whether that stays: what to map again.
 
 One log that contradicts the map may have met a pallet. What counts is what later logs saw there:
-places whose latest looks contradict the map are laid together to areas apart from those that were
-found right again, and each area is judged by the logs that looked at it, one after the other.
+places that the latest looks contradict are laid together to areas apart from those that were found
+right again, and each area is judged by the logs that looked at it, one after the other.
 """
 
 from __future__ import annotations
@@ -25,7 +25,8 @@ from slamreplay.geometry import se2
 if TYPE_CHECKING:
     from slamreplay.fleet.snapshot import Snapshot
 
-#: A place is wrong now if half of so many latest looks say so: one look may miss it.
+#: A place may be wrong now if one of so many latest looks says so: the edge of what was moved is
+#: seen from one side only. Others were found right again, and are laid together apart from these.
 LATEST_LOOKS = 3
 #: Places this far from each other, in rows or columns, are of one area: a gap of one is bridged.
 GAP = 2
@@ -142,15 +143,14 @@ def areas(
 
 
 def _wrong_now(seen: Looks) -> Flags:
-    """(P,) whether the latest looks at each place contradict the map, half of them at least."""
+    """(P,) whether one of the latest looks at each place contradicts the map."""
     last = np.append(starts(seen.place)[1:], len(seen.place))
-    count, against = np.zeros(len(last)), np.zeros(len(last))
+    wrong = np.zeros(len(last), dtype=bool)
     for back in range(1, LATEST_LOOKS + 1):
         at = np.maximum(last - back, 0)
         is_there = (last - back >= 0) & (seen.place[at] == np.arange(len(last)))
-        count += is_there
-        against += is_there & seen.against[at]
-    return np.asarray(2 * against >= count)
+        wrong |= is_there & seen.against[at]
+    return wrong
 
 
 def _together(where: Ints, wrong_now: Flags) -> Ints:

@@ -21,8 +21,9 @@ if TYPE_CHECKING:
 
 #: A log looked at a place if its beams checked a quarter of it: less of it may lie behind a corner.
 LOOK_M2 = 0.25 * PLACE_M**2
-#: A log contradicts a place by five cells of 0.1 m. What stands there newly shows a front of ten
-#: and more; in healthy logs no place had three.
+#: A log contradicts a place by five cells of 0.1 m. Racks that were moved for good in a simulated
+#: hall made 0.08 to 0.24 m2 of a place, log after log; 24 logs of a hall that stayed as it was made
+#: none anywhere.
 AGAINST_M2 = 0.05
 #: Edge of a spot in places.
 SPOT = round(SPOT_M / PLACE_M)

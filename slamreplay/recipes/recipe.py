@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from slamreplay.errors import UsageError
+from slamreplay.gate.rules import Demands
 from slamreplay.labs import LABS
 from slamreplay.plain_yaml import read_plain_yaml
 from slamreplay.recipes.budget import BudgetFile, BudgetRecipe, budget_recipe
@@ -60,3 +61,19 @@ def read_recipe(path: Path) -> Recipe:
         hint=f"lab: one of {', '.join(LABS)}; perturbations: a list of name and levels; budget: "
         "rates and stages; expect, forbid or limits: of a gate",
     )  # fmt: skip
+
+
+def read_demands(path: Path) -> Demands:
+    """What a gate's recipe demands.
+
+    Raises:
+        UsageError: as of `read_recipe`, or it is of another kind, with the command that takes it.
+    """
+    recipe = read_recipe(path)
+    if isinstance(recipe, GateRecipe):
+        return recipe.demands
+    raise UsageError(
+        "it is no gate: it has none of expect, forbid, max_severity, logs",
+        where=path,
+        hint=f"slamreplay perturb --recipe {path}",
+    )

@@ -57,9 +57,9 @@ def unknown_key(key: str, keys: Iterable[str]) -> tuple[str, str]:
 def _told(fault: ErrorDetails, model: type[BaseModel], under: str) -> tuple[str, str | None]:
     """What is wrong, and what could be done about it."""
     key = ".".join(map(str, (under, *fault["loc"]) if under else fault["loc"]))
-    key = key if key.isprintable() else repr(key)[1:-1]  # a key of the user's own
     if fault["type"] == "extra_forbidden":
         return unknown_key(key, _keys(_model_at(model, fault["loc"][:-1])))
+    key = key if key.isprintable() else repr(key)[1:-1]  # a key of the user's own
     if fault["type"] == "missing":
         return f"the key '{key}' is missing", None
     message = fault["msg"].removeprefix("Value error, ").removeprefix("Input ")

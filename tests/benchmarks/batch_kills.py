@@ -18,7 +18,16 @@ from tempfile import TemporaryDirectory
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from batch_cluster import Cluster
-from batch_folders import check_whole, finished, kill, lives, start, workers_of, write_tiny_log
+from batch_folders import (
+    check_whole,
+    committed,
+    finished,
+    kill,
+    lives,
+    start,
+    workers_of,
+    write_tiny_log,
+)
 from conftest import LogWriter
 from type_store import type_store
 
@@ -53,7 +62,7 @@ def of_a_cluster(folder, target, logs, kills, chance):
             while client.poll() is None and time.monotonic() < end:
                 time.sleep(0.02)
             if client.poll() is not None or sum(killed.values()) >= kills:
-                code, _, err = finished(client)
+                code, _, err = finished(client, timeout=3600)
                 assert (code, err) == (0, ""), err
                 return killed, runs
             victim = chance.choice(["client", "worker", "scheduler"])
@@ -83,11 +92,14 @@ def of_its_own(folder, target, logs, kills, chance):
     while True:
         if client is None:
             client, runs = start(*command), runs + 1
-        end = time.monotonic() + chance.uniform(1.0, 7.0)
-        while client.poll() is None and time.monotonic() < end:
+        before, starts = committed(target), chance.random() < 0.3
+        end = time.monotonic() + chance.uniform(0.0, 4.0)
+        while client.poll() is None and (time.monotonic() < end or not starts):
+            if committed(target) > before and not starts:  # else most would die before any work
+                starts, end = True, time.monotonic() + chance.uniform(0.0, 4.0)
             time.sleep(0.02)
         if client.poll() is not None or sum(killed.values()) >= kills:
-            code, _, err = finished(client)
+            code, _, err = finished(client, timeout=3600)
             assert (code, err) == (0, ""), err
             return killed, runs
         workers = workers_of(client)

@@ -10,7 +10,7 @@ with recursive looks as (
   select
     row_number() over (order by site nulls first, map_version, col, "row") as id,
     site, map_version, col, "row",
-    list_avg(list(against::int order by start_ns desc, key desc)[1:$LATEST_LOOKS]) >= 0.5 as wrong
+    list_bool_or(list(against order by start_ns desc, key desc)[1:$LATEST_LOOKS]) as wrong
   from looks
   group by site, map_version, col, "row"
   having bool_or(against)
