@@ -125,13 +125,35 @@ def test_the_sentence_counts_logs_robots_days_and_the_aisle(answers, page):
     assert told == headline.sentence(answers)
     assert f"Of {total.logs} logs of {total.robots} robots in 10 days" in told
     assert f" {total.lost.count} were lost" in told
-    assert "in one aisle of site north whose map has aged" in told
+    (area,) = remap.needed(answers.areas)
+    assert f"; {area.lost_near} of them in one aisle of site north whose map has aged" in told
+    assert told.endswith(f"; software {NEW_SOFTWARE} got worse.")
+
+
+def test_the_sentence_begins_with_what_explains_most_of_the_lost_logs(answers):
+    (area,) = remap.needed(answers.areas)
+    elsewhere = replace(answers, areas=(replace(area, lost_near=0),) * 2)
+    step = next(one for one in answers.steps if one.measure == "lost")
+
+    assert headline.sentence(elsewhere).endswith(
+        f" were lost; {step.now.count} of them with software {NEW_SOFTWARE}; 2 places have to be "
+        "mapped again, the first at site north."
+    )
+    assert headline.sentence(replace(elsewhere, steps=())).endswith(
+        " were lost; 2 places have to be mapped again, the first at site north."
+    )
+    all_of_them = replace(area, lost_near=answers.total.lost.count)
+    assert "; all of them in one aisle of " in headline.sentence(
+        replace(answers, areas=(all_of_them,))
+    )
 
 
 def test_sentences_of_fleets_without_trouble_and_without_logs(answers):
     total = replace(answers.total, lost=replace(answers.total.lost, count=0))
     calm = headline.sentence(replace(answers, total=total, areas=()))
-    one = replace(answers, total=replace(total, lost=replace(total.lost, count=1)), areas=())
+    one = replace(
+        answers, total=replace(total, lost=replace(total.lost, count=1)), areas=(), steps=()
+    )
     empty = replace(answers, total=replace(total, logs=0))
 
     assert calm.startswith("None of ")

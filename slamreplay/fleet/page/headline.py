@@ -37,7 +37,7 @@ def sentence(answers: Answers) -> str:
     lost = total.lost.count
     how = "was" if lost == 1 else "were"
     begin = f"O{start} {lost:,} {how} lost" if lost else f"None o{start} was lost"
-    return f"{begin}{_of_maps(needed(answers.areas), lost)}."
+    return f"{begin}{_explained(answers)}."
 
 
 def tone(answers: Answers) -> str:
@@ -54,17 +54,46 @@ def facts(answers: Answers) -> tuple[Fact, Fact, Fact]:
     return _areas(answers.areas), _rate(answers), _software(answers.steps)
 
 
-def _of_maps(areas: Sequence[Area], lost: int) -> str:
-    if not areas:
-        return "; no map has to be made again" if lost else ", and no map has to be made again"
-    beside = max(areas, key=lambda area: area.lost_near)
-    if not beside.lost_near:
-        places = "place has" if len(areas) == 1 else "places have"
-        return f"; {len(areas):,} {places} to be mapped again, the first at {_site(areas[0])}"
-    all_of_them = beside.lost_near >= lost
-    told = "all of them" if all_of_them and lost > 1 else f"{beside.lost_near:,} of them"
-    told = "it" if all_of_them and lost == 1 else told
-    return f"; {told} in one aisle of {_site(beside)} whose map has aged"
+def _explained(answers: Answers) -> str:
+    """What explains most of the lost logs, an aged aisle or a version, and what else is to do."""
+    areas, lost = needed(answers.areas), answers.total.lost.count
+    if not lost:
+        return _to_map(areas) if areas else ", and no map has to be made again"
+    aisle = max(areas, key=lambda area: area.lost_near, default=None)
+    beside = aisle.lost_near if aisle is not None else 0
+    step = _lost_more(answers.steps)
+    if step is not None and _beyond(step) > beside:
+        told = f"; {_part(step.now.count, lost)} with software {step.after}"
+        return told + (_to_map(areas) if areas else "; no map has to be made again")
+    if aisle is None:
+        return "; no map has to be made again"
+    if not beside:
+        return _to_map(areas)
+    told = f"; {_part(beside, lost)} in one aisle of {_site(aisle)} whose map has aged"
+    return told if step is None else f"{told}; software {step.after} got worse"
+
+
+def _beyond(step: Step) -> float:
+    """How many more logs were lost than with the version before, as often as that one lost its."""
+    return step.now.count - (step.was.value or 0.0) * step.now.n
+
+
+def _part(some: int, lost: int) -> str:
+    if some < lost:
+        return f"{some:,} of them"
+    return "it" if lost == 1 else "all of them"
+
+
+def _to_map(areas: Sequence[Area]) -> str:
+    many = "one place has" if len(areas) == 1 else f"{len(areas):,} places have"
+    where = "at" if len(areas) == 1 else "the first at"
+    return f"; {many} to be mapped again, {where} {_site(areas[0])}"
+
+
+def _lost_more(steps: Sequence[Step]) -> Step | None:
+    """The newest version that loses robots more often than the one before."""
+    worse = [step for step in steps if step.verdict == "worse" and step.measure == "lost"]
+    return worse[-1] if worse else None
 
 
 def _site(area: Area) -> str:
