@@ -24,6 +24,8 @@ FILES = {
     "2026-02/robot2/run/run_0.mcap": b"0",
     "2026-02/robot2/run/run_1.mcap": b"1" * 3,
     "old/x.mcap": b"x",
+    "old/.y.mcap.part": b"y",
+    "old/.tmp/z.mcap": b"z",
     "site.yaml": b"image: site.pgm\nresolution: 0.05\norigin: [0, 0, 0]\n",
     "site.pgm": b"P5\n1 1\n255\n\x00",
 }
@@ -90,6 +92,19 @@ def test_the_parts_of_a_log_are_fetched_with_their_structure(bucket, tmp_path):
     assert (tmp_path / "run/run_1.mcap").read_bytes() == b"111"
     (path,) = fetch(found["s3://logs/2026-02/robot2/b c.bag"], bucket, tmp_path)
     assert path.read_bytes() == FILES["2026-02/robot2/b c.bag"]
+
+
+def test_a_large_object_is_not_held_in_memory_in_many_blocks(bucket, tmp_path, monkeypatch):
+    import s3fs
+
+    def refuse(*_args, **_kwargs):
+        raise AssertionError
+
+    monkeypatch.setattr(s3fs.S3FileSystem, "_download_file_part_concurrent", refuse)
+    storage = {**bucket, "default_block_size": 10_000}
+    (source,) = sources_of(["s3://logs/2026-01/robot1/a.mcap"], storage=storage)
+    (path,) = fetch(source, storage, tmp_path, wait=lambda _s: None)
+    assert path.stat().st_size == 70_000
 
 
 def test_a_map_in_the_bucket_travels_with_the_task(bucket):

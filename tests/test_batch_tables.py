@@ -84,7 +84,8 @@ def test_a_part_fits_what_a_plain_regular_expression_fits(tokens, text):
 
 def test_a_hostile_pattern_takes_no_time():
     began = time.process_time()
-    assert pattern_of("*a" * 400 + "*b").match("a" * 250) is None
+    assert pattern_of("*a" * 4 + "*b").match("a" * 250) is None
+    assert pattern_of("*a" * 400 + "*b").match("a" * 2000) is None
     assert pattern_of("**/*a/**/*a/**/b").match("/".join(["aa"] * 60)) is None
     assert time.process_time() - began < 1.0
 
