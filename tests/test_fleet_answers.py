@@ -238,7 +238,8 @@ def _visits(folder, course, robots=2, **told):
         ("xxxxxx", 3, "re-map", 1.0, 6),
         ("..x...", 2, "temporary", 0.0, -3),  # a pallet came and went
         ("xxxx..", 2, "temporary", 0.6, -2),  # somebody put the rack back
-        ("xxxx.", 2, "watch", 0.75, -1),
+        ("xxxx.", 2, "re-map", 0.75, -1),  # one look may miss it
+        ("xx.", 2, "watch", 0.5, -1),
         (".....x", 2, "watch", None, 1),
         ("....xx", 2, "watch", 1.0, 2),
         ("x...xxxx", 2, "re-map", 4 / 7, 4),  # a pallet long ago does not hide a change

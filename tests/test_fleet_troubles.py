@@ -1,10 +1,10 @@
-"""Logs that failed, when trouble begins, and who became lost beside an area."""
+"""Logs that failed, when trouble begins, and who was lost beside an area."""
 
 import pytest
 from fleet_tables import AGED_AISLE, AISLE_M, BOX_ROWS, fleet
 
 from slamreplay.fleet.answering import answers as answers_of
-from slamreplay.fleet.answers import NEAR_M, SPOT_M
+from slamreplay.fleet.answers import NEAR_M
 
 
 @pytest.fixture(scope="module")
@@ -39,18 +39,17 @@ def test_failed_logs_are_told_with_their_lines_by_site(made, answers):
     assert {one.error for one in answers.failures} == {row["error"] for row in failed}
 
 
-def test_who_became_lost_beside_an_area_is_counted_by_spots(made, answers):
+def test_who_was_lost_beside_an_area_is_counted(made, answers):
     (area,) = (one for one in answers.areas if one.advice == "re-map")
     site = {row["key"]: row["site"] for row in made.tables["logs"].to_pylist()}
-    near = set()
-    for row in made.tables["places"].to_pylist():
-        x, y = (SPOT_M * (row[axis] // SPOT_M) for axis in ("col", "row"))
-        reaches = (
-            x < area.box_m[2] + NEAR_M and x + SPOT_M > area.box_m[0] - NEAR_M
-            and y < area.box_m[3] + NEAR_M and y + SPOT_M > area.box_m[1] - NEAR_M
-        )  # fmt: skip
-        if row["entered_lost"] and reaches and site[row["key"]] == "north":
-            near.add(row["key"])
+    near = {
+        row["key"]
+        for row in made.tables["places"].to_pylist()
+        if row["lost_s"] > 0
+        and site[row["key"]] == "north"
+        and area.box_m[0] - NEAR_M <= row["col"] < area.box_m[2] + NEAR_M
+        and area.box_m[1] - NEAR_M <= row["row"] < area.box_m[3] + NEAR_M
+    }
 
     assert area.box_m[0] >= AGED_AISLE * AISLE_M
     assert area.box_m[1] <= BOX_ROWS[0]

@@ -7,16 +7,16 @@ right again, and each area is judged by the logs that looked at it, one after th
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from slamreplay.fleet.answers import NEAR_M, Advice, Area
 from slamreplay.fleet.cells import AGAINST_M2, Ints, Maps, Rows, of_map, split, starts
+from slamreplay.fleet.changed_regions import Kinds
 from slamreplay.fleet.counted import Counted, Flags
+from slamreplay.fleet.course import RECENT, Course, advice_on, course_of
 from slamreplay.fleet.gathered import AGAINST, HERE, LOST, Gathered, looks
 from slamreplay.fleet.in_use import InUse
 from slamreplay.fleet.schema import PLACE_M
@@ -30,20 +30,6 @@ if TYPE_CHECKING:
 LATEST_LOOKS = 3
 #: Places this far from each other, in rows or columns, are of one area: a gap of one is bridged.
 GAP = 2
-#: A log looked at an area if it saw so much of what others saw of it, and contradicts it with so
-#: much of what the most contradicted: another side of a pallet is less than its front.
-LOOK_SHARE, AGAINST_SHARE = 0.3, 0.2
-#: Smaller areas are legs of a table: no reason to do anything.
-LEAST_M2 = 0.1
-#: To map again takes so many logs that contradict, of two robots where two have looked: a laser
-#: that was knocked contradicts everything, but it is of one robot.
-LEAST_LOGS, LEAST_ROBOTS = 3, 2
-#: And so much of so many latest looks.
-RECENT, RECENT_SHARE = 5, 0.7
-#: So many looks in a row that find the map right: what stood there is gone.
-CLEARED = 2
-#: Regions within an area are of one kind if so many are.
-ONE_KIND = 2.0 / 3.0
 _S_PER_H = 3600.0
 
 
@@ -117,7 +103,7 @@ def areas(
     rows_of_codes = np.searchsorted(found.places.code, seen.codes)
     where = np.column_stack([a[rows_of_codes] for a in (index, col, row)])
     part = _together(where, _wrong_now(seen))
-    kinds = _Kinds(now, logs, found)
+    kinds = Kinds(now, logs, found)
     order = np.argsort(part, kind="stable")
     first = starts(part[order])
     by_area = np.split(order, first[1:])
@@ -134,7 +120,7 @@ def areas(
     answers = []
     for k, places in enumerate(by_area):
         mine = slice(int(ends[k]), int(ends[k + 1]))
-        course = _course(log[mine], sums[mine])
+        course = course_of(log[mine], sums[mine])
         if course is None:
             continue
         map_index, cells = int(where[places[0], 0]), where[places, 1:]
@@ -168,43 +154,13 @@ def _together(where: Ints, wrong_now: Flags) -> Ints:
     return np.asarray(connected_components(links, directed=False)[1], dtype=np.int64)
 
 
-@dataclass(frozen=True, eq=False)
-class _Course:
-    """How the logs that looked at an area found it, one after the other.
-
-    Attributes:
-        log: (N,) in time, from the first that contradicts on.
-        against: (N,) whether it contradicts.
-        m2: median of what those contradict.
-        looked: (M,) all logs that looked, before that, too.
-    """
-
-    log: Ints
-    against: Flags
-    m2: float
-    looked: Ints
-
-
-def _course(log: Ints, sums: se2.Array) -> _Course | None:
-    """None where nothing of weight was ever contradicted."""
-    seen, contradicted = sums.T
-    against = contradicted >= max(AGAINST_M2, AGAINST_SHARE * float(contradicted.max()))
-    is_look = against | (seen >= LOOK_SHARE * float(seen.max()))
-    m2 = float(np.median(contradicted[against])) if against.any() else 0.0
-    if m2 < LEAST_M2:
-        return None
-    log, against = log[is_look], against[is_look]
-    first = int(np.argmax(against))
-    return _Course(log[first:], against[first:], m2, log)
-
-
 def _area(
     logs: Counted,
     found: Gathered,
-    course: _Course,
+    course: Course,
     map_index: int,
     cells: Ints,
-    kinds: _Kinds,
+    kinds: Kinds,
     in_use: InUse,
 ) -> Area:
     low, high = cells.min(axis=0), cells.max(axis=0) + 1
@@ -216,7 +172,7 @@ def _area(
     robots = logs.distinct("robot", against)
     recent = course.against[-RECENT:]
     site, version = found.maps[map_index]
-    advice, why = _advice(
+    advice, why = advice_on(
         len(against),
         robots,
         logs.distinct("robot", course.looked),
@@ -251,21 +207,6 @@ def _area(
     )
 
 
-def _advice(logs: int, robots: int, looked: int, latest: int, recent: float) -> tuple[Advice, str]:
-    if latest <= -CLEARED:
-        return "temporary", f"the last {-latest} logs that looked found the map right again"
-    if latest < 0:
-        return "watch", "the last log that looked found the map right again, one alone"
-    if logs < LEAST_LOGS:
-        return "watch", f"only {logs} {'log contradicts' if logs == 1 else 'logs contradict'} it"
-    if robots < min(LEAST_ROBOTS, looked):
-        return "watch", f"{looked} robots looked there, and only one found it so"
-    if recent < RECENT_SHARE:
-        return "watch", "it comes and goes"
-    last = "one" if latest == 1 else str(latest)
-    return "re-map", f"{logs} logs contradict it, the last {last} that looked among them"
-
-
 def _beside(found: Gathered, map_index: int, low: Ints, high: Ints) -> tuple[float, float, int]:
     """Time of all robots within `NEAR_M` of a box, of it lost, s, and the logs that were lost."""
     reach = round(NEAR_M / PLACE_M)
@@ -280,55 +221,6 @@ def _beside(found: Gathered, map_index: int, low: Ints, high: Ints) -> tuple[flo
     lost = of_map(found.lost.place, map_index)
     who = found.lost.by[lost][near(found.lost.place[lost])]
     return float(added[:, HERE].sum()), float(added[:, LOST].sum()), len(np.unique(who))
-
-
-class _Kinds:
-    """The changed regions of all logs that count, by map."""
-
-    def __init__(self, now: Snapshot, logs: Counted, found: Gathered) -> None:
-        self._by_map = dict(_regions(now, logs, found))
-
-    def within(self, map_index: int, box_m: tuple[float, float, float, float]) -> str | None:
-        """What most of those are that touch a box."""
-        if map_index not in self._by_map:
-            return None
-        kind, boxes = self._by_map[map_index]
-        x_min, y_min, x_max, y_max = box_m
-        touch = (boxes[:, 0] < x_max) & (boxes[:, 2] > x_min)
-        touch &= (boxes[:, 1] < y_max) & (boxes[:, 3] > y_min)
-        names, counts = np.unique(kind[touch].astype(str), return_counts=True)
-        if not len(names):
-            return None
-        most = int(np.argmax(counts))
-        return str(names[most]) if counts[most] >= ONE_KIND * counts.sum() else "mixed"
-
-
-def _regions(
-    now: Snapshot, logs: Counted, found: Gathered
-) -> Iterator[tuple[int, tuple[NDArray[np.object_], se2.Array]]]:
-    """By map: kinds (R,) and boxes (R, 4)."""
-    number = {name: k for k, name in enumerate(found.maps)}
-    judged = {
-        key: site
-        for key, site, is_judged in zip(
-            logs.texts["key"].tolist(),
-            logs.texts["site"].tolist(),
-            logs.judged.tolist(),
-            strict=True,
-        )
-        if is_judged
-    }
-    columns = ("key", "map_version", "kind", "x_min_m", "y_min_m", "x_max_m", "y_max_m")
-    by_map: dict[int, list[tuple[str, list[float]]]] = {}
-    for table in now.tables("regions", columns):
-        for key, version, kind, *box in zip(
-            *(table[name].to_pylist() for name in columns), strict=True
-        ):
-            if key in judged and (judged[key], version) in number:
-                by_map.setdefault(number[judged[key], version], []).append((kind, box))
-    for map_index, rows in by_map.items():
-        kinds = np.array([kind for kind, _ in rows], dtype=object)
-        yield map_index, (kinds, np.array([box for _, box in rows], dtype=np.float64))
 
 
 _ADVICES: tuple[Advice, ...] = ("re-map", "watch", "temporary")

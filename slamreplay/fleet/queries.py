@@ -12,7 +12,7 @@ from importlib.resources import files
 from pathlib import Path
 from string import Template
 
-from slamreplay.fleet import areas, in_use, picks, spots
+from slamreplay.fleet import areas, changed_regions, course, in_use, picks, spots
 from slamreplay.fleet.answers import DIMENSIONS, NEAR_M, SPOT_M
 from slamreplay.fleet.cells import AGAINST_M2, LOOK_M2, SPOT
 from slamreplay.fleet.intervals import Z
@@ -32,15 +32,15 @@ _VALUES: dict[str, object] = {
     "AGAINST_M2": AGAINST_M2,
     "LATEST_LOOKS": areas.LATEST_LOOKS,
     "GAP": areas.GAP,
-    "LOOK_SHARE": areas.LOOK_SHARE,
-    "AGAINST_SHARE": areas.AGAINST_SHARE,
-    "LEAST_M2": areas.LEAST_M2,
-    "AREA_LOGS": areas.LEAST_LOGS,
-    "AREA_ROBOTS": areas.LEAST_ROBOTS,
-    "RECENT": areas.RECENT,
-    "RECENT_SHARE": areas.RECENT_SHARE,
-    "CLEARED": areas.CLEARED,
-    "ONE_KIND": areas.ONE_KIND,
+    "LOOK_SHARE": course.LOOK_SHARE,
+    "AGAINST_SHARE": course.AGAINST_SHARE,
+    "LEAST_M2": course.LEAST_M2,
+    "AREA_LOGS": course.LEAST_LOGS,
+    "AREA_ROBOTS": course.LEAST_ROBOTS,
+    "RECENT": course.RECENT,
+    "RECENT_SHARE": course.RECENT_SHARE,
+    "CLEARED": course.CLEARED,
+    "ONE_KIND": changed_regions.ONE_KIND,
     "IN_USE_DAYS": in_use.DAYS,
     "MOST_PICKS": picks.MOST,
     "STOP_S": picks.STOP_S,

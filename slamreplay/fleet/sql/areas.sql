@@ -128,7 +128,7 @@ with recursive looks as (
     coalesce(lost_near, 0) as lost_near,
     coalesce(in_use, true) as in_use,
     case
-      when not last_against then if(run >= $CLEARED, 'temporary', 'watch')
+      when not last_against and run >= $CLEARED then 'temporary'
       when logs < $AREA_LOGS or robots < least($AREA_ROBOTS, looked) then 'watch'
       when recent < $RECENT_SHARE then 'watch'
       else 're-map'
