@@ -54,6 +54,7 @@ class Bench:
     finished: list = field(default_factory=list)
     read: list = field(default_factory=list)
     pages: int = 0
+    fails_at: int = 0
     tally: Tally = field(default_factory=Tally)
     error_of: dict = field(default_factory=dict)
     while_reading: dict = field(default_factory=dict)
@@ -116,6 +117,8 @@ class Bench:
 
     def page(self):
         self.pages += 1
+        if self.pages == self.fails_at:
+            raise ValueError("a table that nobody thought of")
 
     def names(self):
         return [name for name, _ in self.read]
@@ -232,6 +235,18 @@ def test_rounds_go_on_where_the_last_one_ended(bench):
 
     assert bench.names() == ["a.mcap", "b.mcap"]
     assert bench.pages == 2
+
+
+def test_a_page_that_fails_is_told_and_made_in_the_next_round(bench):
+    bench.fails_at = 1
+    bench.steps = [
+        bench.write("a.mcap", mcap(1)), *WAIT, bench.write("b.mcap", mcap(2)), *WAIT,
+    ]  # fmt: skip
+    bench.run()
+
+    assert (bench.names(), bench.pages) == (["a.mcap", "b.mcap"], 2)
+    assert "a table that nobody thought of" in bench.told[0]
+    assert bench.told[1:] == ["that is over: going on"]
 
 
 def test_a_log_that_is_replaced_is_done_again(bench):

@@ -22,6 +22,7 @@ from slamreplay.batch.loop import looked_back
 from slamreplay.batch.relabel import relabel
 from slamreplay.batch.settling import Looked, Settling, is_there
 from slamreplay.batch.task import LogResult, LogSource, LogTask
+from slamreplay.batch.worker import line_of
 from slamreplay.errors import OutputError, SlamreplayError
 
 #: The results of tasks, as `loop.looked_back` gives them.
@@ -149,7 +150,7 @@ def watch(
             before = tally.finished, tally.relabelled
             has_more = looked is not None and rounds.play(looked, is_first=is_first)
             if (tally.finished, tally.relabelled) != before:
-                rounds.written(finish_round)
+                rounds.finish(finish_round)
             if pace.is_once and not has_more:
                 return tally
             is_first = False
@@ -244,6 +245,19 @@ class _Rounds:
 
     def _relabel(self, known: Sequence[LogTask]) -> None:
         self.tally.relabelled += relabel(self.target, known)
+
+    def finish(self, make: Callable[[], None]) -> None:
+        """Make anew what is made after a round; a fault in it must not end a watch over night."""
+        try:
+            self.written(make)
+        except OutputError:
+            raise
+        except Exception as error:
+            if self.pace.is_once:
+                raise
+            self._tell("page", f"the page is as it was: {line_of(error)}")
+        else:
+            self._tell("page", "")
 
     def _keep(self, result: LogResult, source: LogSource) -> None:
         is_other = not self.settling.still_is(source)

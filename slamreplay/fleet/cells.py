@@ -33,8 +33,8 @@ SPOT = round(SPOT_M / PLACE_M)
 _BITS = 24
 _HALF = 1 << (_BITS - 1)
 MOST_MAPS = 1 << (63 - 2 * _BITS)
-#: Sums are merged when they have grown to so many rows.
-_MERGE_AT = 1 << 20
+#: Sums are merged when so many rows, or as many as there are sums, have come to them.
+_MERGE_AT = 1 << 18
 
 Ints = NDArray[np.int64]
 
@@ -91,7 +91,7 @@ class Adding:
         """More rows (N,), (N, C) and (N,)."""
         self._held.append(_merged(code, added, greatest))
         self._rows += len(self._held[-1][0])
-        if self._rows > _MERGE_AT:
+        if self._rows > max(_MERGE_AT, len(self._held[0][0])):
             self._merge()
 
     def sums(self) -> Sums:
@@ -191,7 +191,8 @@ class Maps:
         import pyarrow as pa
 
         keys = pa.array(self._logs.texts["key"].tolist(), type=pa.string())
-        for table in now.tables("places", ("key", "map_version", "col", "row", *numbers)):
+        columns = ("key", "map_version", "col", "row", *numbers)
+        for table in now.tables("places", columns, coded=True):
             rows = self._numbered(table, keys, numbers)
             if len(rows.log):
                 yield rows
@@ -199,8 +200,9 @@ class Maps:
     def _numbered(self, table: pa.Table, keys: pa.Array, numbers: tuple[str, ...]) -> Rows:
         import pyarrow.compute as pc
 
-        log = pc.index_in(table["key"], value_set=keys).fill_null(-1).to_numpy().astype(np.int64)
-        versions = table["map_version"].combine_chunks().dictionary_encode()
+        key, versions = (table[name].combine_chunks() for name in ("key", "map_version"))
+        known = pc.index_in(key.dictionary, value_set=keys).fill_null(-1).to_numpy()
+        log = known[key.indices.to_numpy()].astype(np.int64)
         version = versions.indices.fill_null(-1).to_numpy().astype(np.int64)
         col, row = (table[name].to_numpy().astype(np.int64) for name in ("col", "row"))
         counts = (log >= 0) & (version >= 0)

@@ -191,22 +191,38 @@ def unpaired(old: ArrayLike, new: ArrayLike) -> Difference:
     return _difference(before.mean, after.mean, step, N_EFF_MIN, identical=False)
 
 
-def over_units(old: Sequence[float], new: Sequence[float]) -> Difference:
+def over_units(old: Sequence[float], new: Sequence[float], *, by_ratio: bool = False) -> Difference:
     """A number of each seed or of each log, then and now: Student's t-test of the differences.
 
     Units are independent of each other. They need not be known equally well: at levels of 5 % and
     below the test errs to the safe side where variances differ (Bakirov and Szekely 2005, by way
     of Ibragimov and Mueller 2010, t-statistic based correlation and heterogeneity robust inference,
     JBES 28, 453-468). Signs alone, flipped at random, could not fall below 2^(1 - n).
+
+    Args:
+        old: of each unit, in the baseline.
+        new: of the same units, now.
+        by_ratio: take the p-value of the logarithms where all numbers are above 0 and agree with
+            the difference of the means about its side: errors scatter in proportion to their size,
+            and one run that went far astray would hide that all others went wrong, too.
     """
     before, after = np.asarray(old, dtype=np.float64), np.asarray(new, dtype=np.float64)
     known = np.isfinite(before) & np.isfinite(after)
     before, after = before[known], after[known]
+    found = _difference(_mean(before), _mean(after), _step(before, after), UNITS_MIN,
+                        identical=np.array_equal(before, after))  # fmt: skip
+    if by_ratio and found.p_value is not None and min(before.min(), after.min()) > 0.0:
+        ratio = _step(np.log(before), np.log(after))
+        if ratio.mean * found.mean > 0.0:
+            return replace(found, p_value=_p_value(ratio))
+    return found
+
+
+def _step(before: Array, after: Array) -> Mean:
+    """The mean of differences that are independent of each other."""
     d, n = after - before, len(before)
     error = float(d.std(ddof=1)) / math.sqrt(n) if n > 1 else math.nan
-    step = Mean(n, float(d.mean()) if n else math.nan, float(n), error, float(n - 1))
-    same = np.array_equal(before, after)
-    return _difference(_mean(before), _mean(after), step, UNITS_MIN, identical=same)
+    return Mean(n, _mean(d), float(n), error, float(n - 1))
 
 
 def over_logs(each: Sequence[Difference]) -> Difference:

@@ -6,10 +6,8 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from slamreplay.errors import UsageError
 from slamreplay.gate.metrics import METRICS, OF_TRIALS, Better, Metric
 from slamreplay.gate.rules import BaselineRules
-from slamreplay.registry import nearest
 
 #: The mean of a number over time, by the number.
 MEAN_OF: dict[str, str] = {
@@ -83,24 +81,11 @@ def metric_named(name: str) -> Metric | None:
     return OF_TRIALS.get(of_trial) if dot else METRICS.get(name)
 
 
-def check_margin(name: str, estimators: tuple[str, ...] = ()) -> None:
-    """Refuse a margin of a number that is not compared with a baseline.
-
-    Args:
-        name: the number.
-        estimators: those that the gate runs again.
-
-    Raises:
-        UsageError: with the nearest name as a hint.
-    """
-    of_trials = [of for of, metric in OF_TRIALS.items() if metric.better != "either"]
-    trials = [f"{estimator}.{of}" for estimator in estimators for of in of_trials]
-    known = (*MEAN_OF.values(), *PER_LOG, *trials)
-    if name in MEAN_OF:
-        raise UsageError(f"of {name} the mean is compared", hint=f"write {MEAN_OF[name]}")
-    if name not in known:
-        raise UsageError(f"{name[:80]!r} is not compared with a baseline",
-                         hint=nearest(name, known))  # fmt: skip
+def compared(estimators: tuple[str, ...] = ()) -> tuple[str, ...]:
+    """All numbers that are compared, and may be given a margin of their own."""
+    of_trials = [name for name, metric in OF_TRIALS.items() if metric.better != "either"]
+    trials = [f"{estimator}.{name}" for estimator in estimators for name in of_trials]
+    return (*MEAN_OF.values(), *PER_LOG, *trials)
 
 
 def margin_of(name: str, old: float, rules: BaselineRules) -> float:

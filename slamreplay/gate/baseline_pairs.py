@@ -69,7 +69,7 @@ def of_log(match: Match) -> Iterator[Compared]:
             continue
         # The same seed draws the same numbers, as long as nothing draws more of them in between.
         same = len(drawn) == len(again)
-        difference = over_units(drawn, again) if same else unpaired(drawn, again)
+        difference = over_units(drawn, again, by_ratio=True) if same else unpaired(drawn, again)
         yield Compared(name, difference, unit="seeds", infinite=_infinite(drawn, again))
 
 
@@ -95,7 +95,9 @@ def of_all(matches: Sequence[Match], of_each: Sequence[Compared]) -> Iterator[Co
         both = [(match.old.values[name], match.new.values[name]) for match in matches
                 if name in match.old.values and name in match.new.values]  # fmt: skip
         old, new = zip(*both, strict=True)
-        yield Compared(name, over_units(old, new), unit="logs", infinite=_infinite(old, new))
+        yield Compared(
+            name, over_units(old, new, by_ratio=True), unit="logs", infinite=_infinite(old, new)
+        )
 
 
 def _of_series(

@@ -85,21 +85,26 @@ def of_comparison(
         text = f"no difference: the same in all {d.n} {one.unit}"
         return _outcome(one, title, "passed", text + _alone(one), 0.0, margin, unit)
     change = _change(d, unit)
-    if not d.enough or corrected is None:
-        text = f"insufficient: {_worth(one, d)}, {d.needed} are needed ({change})"
-        return _outcome(one, title, "skipped", text + _alone(one), d.mean, margin, unit)
-    sure = corrected < rules.alpha
-    p = f"p = {d.p_value:.1g}, {corrected:.1g} after Holm over {tests} tests"
-    if not sure:
-        text = f"no difference that is sure: {change} ({p})"
-        return _outcome(one, title, "passed", text + _alone(one), d.mean, margin, unit)
-    if abs(d.mean) <= margin:
-        text = f"sure, but within the margin of {_said(margin, unit)}: {change} ({p})"
-        return _outcome(one, title, "passed", text + _alone(one), d.mean, margin, unit)
     worse = is_worse(one.name, d.old, d.new, one.expected)
-    ends = "worse" if worse else "better: commit a new baseline"
-    text = f"{change}, {ends} (margin {_said(margin, unit)}; {p})"
-    status = "failed" if worse else "passed"
+    if d.enough and corrected is not None:
+        found = f"p = {d.p_value:.1g}, {corrected:.1g} after Holm over {tests} tests"
+        sure = corrected < rules.alpha
+        lead = "no difference that is sure"
+    else:
+        found, sure = f"{_worth(one, d)}, {d.needed} are needed", False
+        lead = "insufficient"
+    gross = worse and one.blocks is not None and 0.0 < margin * (rules.gross or 0.0) < abs(d.mean)
+    status = "passed" if d.enough else "skipped"
+    if sure and abs(d.mean) <= margin:  # gross is never less than a margin
+        text = f"sure, but within the margin of {_said(margin, unit)}: {change} ({found})"
+    elif sure and not worse:
+        text = f"{change}, better: commit a new baseline (margin {_said(margin, unit)}; {found})"
+    elif sure or gross:
+        status = "failed"
+        fact = "" if sure else "not sure to recur, but a fact of this log; "
+        text = f"{change}, worse ({fact}margin {_said(margin, unit)}; {found})"
+    else:
+        text = f"{lead}: {change} ({found})"
     return _outcome(one, title, status, text + _alone(one), d.mean, margin, unit)
 
 

@@ -58,10 +58,14 @@ class BaselineRules:
         alpha: chance of any false alarm in a run of the gate, over all its tests (after Holm).
         margins: by number, the difference below which it does not matter, in the number's unit;
             those that are not named have the defaults of `gate.baseline_metrics`.
+        gross: a mean over time that is worse by so many margins on the very same log fails even
+            where its blocks are too few or too much alike to prove it: nothing was drawn at
+            random, so that it is a fact of that log. 1 or more; None leaves all to the tests.
     """
 
     alpha: float = 0.001
     margins: Mapping[str, float] = field(default_factory=dict)
+    gross: float | None = 5.0
 
 
 @dataclass(frozen=True)

@@ -17,12 +17,13 @@ from slamreplay.bundle.findings import Severity
 from slamreplay.errors import UsageError
 from slamreplay.estimators import RECORDED
 from slamreplay.gate.asked import check_asked
-from slamreplay.gate.baseline_metrics import check_margin
+from slamreplay.gate.baseline_metrics import compared
 from slamreplay.gate.metrics import metric_of
 from slamreplay.gate.rules import BaselineRules, Demands, Limit, Rules
 from slamreplay.labs.lab import Strict
 from slamreplay.recipes.dose_recipe import check_estimators
 from slamreplay.recipes.validation import one_line, validated
+from slamreplay.registry import nearest
 
 #: Keys of which one makes a recipe a gate.
 KEYS = ("expect", "forbid", "max_severity", "limits", "logs")
@@ -54,10 +55,11 @@ class RulesPart(Strict):
 
 
 class BaselinePart(Strict):
-    """When a difference from the committed baseline counts."""
+    """When a difference from a committed baseline counts."""
 
-    alpha: Annotated[float, Field(gt=0.0, le=0.5)] = BaselineRules.alpha
-    margins: dict[str, Annotated[float, Field(ge=0.0, le=1e9)]] = Field(default_factory=dict)
+    alpha: Annotated[float, Field(gt=0.0, le=0.1)] = BaselineRules.alpha
+    margins: dict[str, Annotated[float, Field(ge=0.0)]] = Field(default_factory=dict)
+    gross: Annotated[float, Field(ge=1.0, le=1e6)] | None = BaselineRules.gross
 
 
 class GateFile(RulesPart):
@@ -67,8 +69,8 @@ class GateFile(RulesPart):
     question: _Question
     estimators: Annotated[list[_Name], Field(max_length=50)] = Field(default_factory=list)
     seeds: Annotated[int, Field(ge=1, le=200)] = 1
-    logs: dict[str, RulesPart] = Field(default_factory=dict)
     baseline: BaselinePart = Field(default_factory=BaselinePart)
+    logs: dict[str, RulesPart] = Field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -117,9 +119,10 @@ def gate_recipe(given: Mapping[str, Any], path: Path) -> GateRecipe:
             "it demands nothing", where=path, hint=f"write one of {', '.join(KEYS[:-1])}"
         )
     for name in file.baseline.margins:
-        _at(f"baseline.margins.{name}", path, check_margin, name, estimators)
-    baseline = BaselineRules(file.baseline.alpha, file.baseline.margins)
-    return GateRecipe(Demands(file.question, top, of_logs, estimators, file.seeds, baseline))
+        _at("baseline.margins", path, _check_compared, name, estimators)
+    baseline = BaselineRules(file.baseline.alpha, file.baseline.margins, file.baseline.gross)
+    demands = Demands(file.question, top, of_logs, estimators, file.seeds, baseline)
+    return GateRecipe(demands)
 
 
 def _rules(
@@ -158,6 +161,14 @@ def _rules(
 
 def _demands(rules: Rules) -> bool:
     return bool(rules.expect or rules.forbid or rules.limits or rules.max_severity is not None)
+
+
+def _check_compared(name: str, estimators: tuple[str, ...]) -> None:
+    names = compared(estimators)
+    if name not in names:
+        raise UsageError(
+            f"{name[:80]!r} is not compared with a baseline", hint=nearest(name, names)
+        )
 
 
 def _check_asked(texts: tuple[str, ...]) -> None:

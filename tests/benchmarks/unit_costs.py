@@ -174,8 +174,9 @@ def table(rows: list[dict[str, float | str]]) -> str:
             )
         )
     start = _sum(rows, "start") / len(rows)
-    told = f"A process takes {start:.0f} s of CPU until its second log; rows of a log, laid together, take "
-    return "\n".join([*lines, "", f"{told}{float(rows[0]['rows_b']) / 1e3:.1f} kB."])
+    rows_kb = float(rows[0]["rows_b"]) / 1e3
+    told = f"A process takes {start:.0f} s of CPU until its second log; the rows of a log take "
+    return "\n".join([*lines, "", f"{told}{rows_kb:.1f} kB when laid together."])
 
 
 def answer(rows: list[dict[str, float | str]], fleet: Fleet) -> str:
