@@ -142,6 +142,10 @@ def test_the_sentence_begins_with_what_explains_most_of_the_lost_logs(answers):
     assert headline.sentence(replace(elsewhere, steps=())).endswith(
         " were lost; 2 places have to be mapped again, the first at site north."
     )
+    few = (replace(area, lost_near=1),)
+    assert headline.sentence(replace(elsewhere, areas=few, steps=())).endswith(
+        " were lost; one place has to be mapped again, at site north."
+    )
     all_of_them = replace(area, lost_near=answers.total.lost.count)
     assert "; all of them in one aisle of " in headline.sentence(
         replace(answers, areas=(all_of_them,))

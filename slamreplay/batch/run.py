@@ -33,6 +33,7 @@ class BatchEnd:
         megabytes: of the logs done now.
         seconds: that it took.
         page: of all logs that the folder has.
+        fleet: what that page says, in a few lines.
     """
 
     logs: int
@@ -43,6 +44,7 @@ class BatchEnd:
     megabytes: float
     seconds: float
     page: Path
+    fleet: tuple[str, ...]
 
 
 def run_batch(
@@ -71,6 +73,8 @@ def run_batch(
         OutputError: the folder is somebody else's, in use, or cannot be written.
         ClusterError: the cluster cannot be used, or went away for good.
     """
+    from slamreplay.fleet.answering import answers
+    from slamreplay.fleet.page.lines import fleet_lines
     from slamreplay.fleet.page.writer import write_fleet_page
 
     begun = time.monotonic()
@@ -95,7 +99,8 @@ def run_batch(
                 told[result.key] = fate_of(result)
                 say(told, result.key)
         compact(target, tell)
-        page = write_fleet_page(target, warn=tell)
+        fleet = answers(target)
+        page = write_fleet_page(target, fleet, warn=tell)
     failed = [(task.source.log, told[task.key].error) for task in tasks]
     return BatchEnd(
         logs=len(tasks),
@@ -106,6 +111,7 @@ def run_batch(
         megabytes=sum(size_of(task) for task in todo) / _MB,
         seconds=time.monotonic() - begun,
         page=page,
+        fleet=tuple(fleet_lines(fleet)),
     )
 
 

@@ -109,6 +109,8 @@ def _batch(
         say_json(_as_json(end, output))
     else:
         _show(end)
+        for line in end.fleet:
+            say(line)
         say_path(end.page)
     if len(end.failed) == end.logs:
         complain(f"slamreplay: none of the {end.logs} logs could be looked back on")
@@ -137,6 +139,7 @@ def _as_json(end: BatchEnd, output: Path) -> dict[str, object]:
         "kept": end.kept,
         "states": dict(end.states),
         "gates": dict(end.gates),
+        "fleet": list(end.fleet),
         "failed": [{"log": log, "error": line} for log, line in end.failed],
         "done_mb": round(end.megabytes, 3),
         "seconds": round(end.seconds, 3),

@@ -202,7 +202,7 @@ class Area:
             confirm the map again.
         near_h: time of all robots within `NEAR_M` of it, h.
         lost_near_s: time lost there.
-        lost_near: logs in which the robot became lost in a spot that reaches there.
+        lost_near: logs in which the robot was lost there.
         in_use: whether its map still was at the end of what is known of the site.
         advice: re-map: it stays that way, by more than one robot or log; temporary: the map was
             found right again; watch: neither is known yet.

@@ -10,6 +10,9 @@ from slamreplay.fleet.page import words
 from slamreplay.fleet.page.remap import needed
 from slamreplay.verdict.words import square_metres
 
+#: An aisle in which fewer of the lost logs than this share were lost explains nothing.
+_TELLS = 0.1
+
 
 @dataclass(frozen=True)
 class Fact:
@@ -67,7 +70,7 @@ def _explained(answers: Answers) -> str:
         return told + (_to_map(areas) if areas else "; no map has to be made again")
     if aisle is None:
         return "; no map has to be made again"
-    if not beside:
+    if beside < _TELLS * lost:
         return _to_map(areas)
     told = f"; {_part(beside, lost)} in one aisle of {_site(aisle)} whose map has aged"
     return told if step is None else f"{told}; software {step.after} got worse"

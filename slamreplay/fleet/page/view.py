@@ -50,7 +50,6 @@ class FleetView:
     columns_alt: str
     columns_note: str
     most_a_day: int
-    first_card: remap.Card | None
     images: tuple[Image, ...]
     remap_count: int
     cards: tuple[remap.Card, ...]
@@ -111,12 +110,11 @@ def view_of(answers: Answers, images: Mapping[str, MapImage]) -> FleetView:
         ),
         hatches=tuple(HATCHES.items()),
         columns=columns([(name, states) for name, states in days[-_MOST_DAYS:]]),
-        columns_alt="Logs of each day by state. "
+        columns_alt="Logs of the last days by state. "
         + "; ".join(f"{name}: {in_words(states)}" for name, states in days[-7:])
         + ".",
         columns_note=_older(len(days)),
         most_a_day=max((sum(states.values()) for _, states in days[-_MOST_DAYS:]), default=0),
-        first_card=cards[0] if cards else None,
         images=tuple(Image(name, image) for name, image in named.values()),
         remap_count=len(needed),
         cards=cards,
