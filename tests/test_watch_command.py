@@ -69,6 +69,8 @@ def test_once_on_nothing_new(place, tmp_path):
         (("in", "-o", "out", "--on-finished", "'"), "--on-finished: No closing quotation"),
         (("in", "-o", "out", "--on-finished", " "), "--on-finished has no command"),
         (("in", "-o", "out", "--workers", "0"), "0 workers do no work"),
+        (("in", "-o", "out", "--every", "nan"), "--every"),
+        (("in", "-o", "out", "--give-up", "inf"), "--give-up inf is no time to wait"),
     ],
 )
 def test_what_makes_no_sense_gets_one_line(place, tmp_path, options, line, monkeypatch, capsys):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import signal
 from collections.abc import Callable, Iterator, Sequence
@@ -32,10 +33,12 @@ if TYPE_CHECKING:
     from slamreplay.batch.watch import Finished, Tally
 
 _FAILED, _UNREADABLE, _INTERRUPTED, _TERMINATED = 1, 2, 130, 143
-#: So many logs are done between two looks; more, where many workers would wait for the last one.
-_PER_ROUND, _PER_ROUND_OF_CLUSTER = 32, 512
+#: So many logs are done between two looks, or so many of each worker where those are more: at the
+#: end of a round some wait for the last one.
+_PER_ROUND, _PER_WORKER, _PER_ROUND_OF_CLUSTER = 32, 8, 512
 #: So many of what never became whole are told at the end; all of them were told when it was seen.
 _MOST_LACKING = 10
+_LONGEST_S = 366 * 86_400.0
 #: The hook may take so long, s.
 _HOOK_S = 60.0
 
@@ -109,11 +112,13 @@ def _watch(
 
     who = Workers(workers, memory_limit, scheduler).checked()
     _check_apart(folder, output)
+    _check_times(every=every_s, settle=settle_s, give_up=give_up_s)
     hook = _hook(on_finished)
     demands = None if recipe is None else read_demands(recipe)
     options = storage_options(storage or ())
     tell = _new_only(complain)
-    per_round = _PER_ROUND if scheduler is None else _PER_ROUND_OF_CLUSTER
+    here = max(_PER_ROUND, _PER_WORKER * (workers or os.cpu_count() or 1))
+    per_round = here if scheduler is None else _PER_ROUND_OF_CLUSTER
     tally = Tally()
 
     def finished(one: Finished) -> None:
@@ -151,6 +156,14 @@ def _check_apart(folder: str, output: Path) -> None:
     """Refuse an output within the folder: each look would go through all reports."""
     if Path(folder).resolve() in (output.resolve(), *output.resolve().parents):
         raise UsageError("lies in the folder that is watched", where=output, hint="give another -o")
+
+
+def _check_times(**seconds: float) -> None:
+    """Refuse what no clock comes to."""
+    for name, value in seconds.items():
+        if not value <= _LONGEST_S:
+            option = f"--{name.replace('_', '-')}"
+            raise UsageError(f"{option} {value:g} is no time to wait", hint="in s, a year at most")
 
 
 def _sources(
