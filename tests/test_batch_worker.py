@@ -8,6 +8,7 @@ from batch_folders import write_tiny_log
 
 from slamreplay.batch import worker
 from slamreplay.batch.keys import task_of
+from slamreplay.batch.loop import _with_attempts
 from slamreplay.batch.sources import sources_of
 from slamreplay.batch.worker import line_of, look_back
 from slamreplay.errors import LogError
@@ -71,6 +72,13 @@ def test_the_costs_are_those_of_a_process_that_worked(result):
     assert row["cpu_s"] > 0
     assert row["wall_s"] > 0
     assert row["peak_mb"] > 50
+
+
+def test_how_often_a_log_was_begun_is_told_by_who_knows(result):
+    told = _with_attempts(result, 3)
+
+    assert told.tables["costs"].column("attempts").to_pylist() == [3]
+    assert told.tables["costs"].schema.equals(result.tables["costs"].schema, check_metadata=True)
 
 
 def test_a_log_that_cannot_be_read_gives_its_line(tmp_path):
