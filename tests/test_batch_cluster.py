@@ -25,6 +25,12 @@ class Client:
         self.number = number
         self.of_scheduler = of_scheduler
 
+    def submit(self, function, *arguments, pure):
+        return self
+
+    def release(self):
+        pass
+
     def wait_for_workers(self, count, timeout):
         if self.number is TimeoutError:
             raise TimeoutError

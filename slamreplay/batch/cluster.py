@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from distributed import Client, LocalCluster
 
 #: How long a scheduler is looked for, and how long a worker of it is waited for, s.
-_CONNECT_S, _FIRST_WORKER_S = 10.0, 60.0
+_CONNECT_S, _FIRST_WORKER_S = 10.0, 300.0
 #: How often workers of this machine are started.
 _STARTS = 3
 #: How long is enough for saying goodbye, s.
@@ -216,6 +216,8 @@ def _reached(address: str, patience_s: float) -> Client:
 
 def _check_versions(client: Client, address: str) -> None:
     """Whether the other side runs what this side runs: pickles and results depend on it."""
+    # Clusters that grow with their tasks have no worker before there is one.
+    probe = client.submit(pkgutil.resolve_name, _NUMBER, pure=False)
     try:
         client.wait_for_workers(1, timeout=_FIRST_WORKER_S)
     except TimeoutError as error:
@@ -223,6 +225,7 @@ def _check_versions(client: Client, address: str) -> None:
             f"the scheduler at {address} has no worker after {_FIRST_WORKER_S:g} s",
             hint=f"start some with `dask worker {address} --nthreads 1`",
         ) from error
+    probe.release()
     told = client.get_versions()
     ours = {"python": platform.python_version(), **_packages(told["client"])}
     others = {"the scheduler": told["scheduler"], **told["workers"]}

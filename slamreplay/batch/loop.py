@@ -81,7 +81,7 @@ def served(client: Client, work: Work, workers: Workers) -> Iterator[LogResult]:
     seen = looked = time.monotonic()
     threads = _threads(client)
     while work.left:
-        while (task := work.next(threads)) is not None:
+        while (task := work.next(max(threads, 1))) is not None:
             future = _sent(client, task)
             out[future] = task
             client.loop.add_callback(_fetch, client, future, ended)
