@@ -10,8 +10,9 @@ from pathlib import Path
 from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING
 
-from slamreplay.batch.cluster import ClusterError, Connect, Workers, connected
+from slamreplay.batch.cluster import Connect, Workers, connected
 from slamreplay.batch.task import LogResult, LogTask
+from slamreplay.batch.versions import ClusterError
 from slamreplay.batch.work import Work
 from slamreplay.batch.worker import failed, line_of, look_back
 
