@@ -6,7 +6,8 @@ import dask
 import distributed
 import pytest
 
-from slamreplay.batch.cluster import ClusterError, Workers, _check_versions
+from slamreplay.batch.cluster import Workers
+from slamreplay.batch.versions import ClusterError, check_versions
 from slamreplay.errors import UsageError
 from slamreplay.version import __version__
 
@@ -24,6 +25,12 @@ class Client:
         self.told = {"client": HERE, "scheduler": scheduler, "workers": {"tcp://w": worker}}
         self.number = number
         self.of_scheduler = of_scheduler
+
+    def submit(self, function, *arguments, pure):
+        return self
+
+    def release(self):
+        pass
 
     def wait_for_workers(self, count, timeout):
         if self.number is TimeoutError:
@@ -49,12 +56,12 @@ def versions(python=None, **packages):
 
 
 def test_the_same_on_both_sides_is_taken():
-    _check_versions(Client(), ADDRESS)
+    check_versions(Client(), ADDRESS)
 
 
 def test_another_patch_of_python_is_taken():
     major, minor, *_ = sys.version_info
-    _check_versions(Client(worker=versions(f"{major}.{minor}.99.final.0")), ADDRESS)
+    check_versions(Client(worker=versions(f"{major}.{minor}.99.final.0")), ADDRESS)
 
 
 @pytest.mark.parametrize(
@@ -74,7 +81,7 @@ def test_another_patch_of_python_is_taken():
 )
 def test_others_are_refused_in_one_line(client, line):
     with pytest.raises(ClusterError, match=line):
-        _check_versions(client, ADDRESS)
+        check_versions(client, ADDRESS)
 
 
 @pytest.mark.parametrize("address", [ADDRESS, "tls://h:1", "host:8786", "tcp://[::1]:8786"])

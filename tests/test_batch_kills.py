@@ -2,6 +2,7 @@
 
 import json
 import signal
+import sys
 from contextlib import ExitStack
 
 import pytest
@@ -16,6 +17,10 @@ from batch_folders import (
     wait_until,
     workers_of,
     write_tiny_log,
+)
+
+pytestmark = pytest.mark.skipif(
+    not sys.platform.startswith("linux"), reason="finds a client's workers in /proc"
 )
 
 

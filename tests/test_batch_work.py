@@ -25,13 +25,6 @@ def test_few_tasks_are_out_at_once():
     assert sent(work, 2) == []
 
 
-def test_nothing_goes_out_without_workers():
-    work = Work(tasks(1))
-
-    assert sent(work, 0) == []
-    assert work.left
-
-
 def test_who_waited_behind_a_killer_is_not_taken_for_one():
     work = Work(tasks(2))
     killer, other = sent(work, 1)

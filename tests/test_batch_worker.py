@@ -1,14 +1,19 @@
 """What a worker makes of one log: the same each time, a line where it fails, and nothing left."""
 
+import json
+from dataclasses import replace
+
 import pytest
 from batch_folders import write_tiny_log
 
 from slamreplay.batch import worker
 from slamreplay.batch.keys import task_of
+from slamreplay.batch.loop import _with_attempts
 from slamreplay.batch.sources import sources_of
 from slamreplay.batch.worker import line_of, look_back
 from slamreplay.errors import LogError
 from slamreplay.fleet.schema import TABLES
+from slamreplay.gate.rules import Demands, Rules
 
 
 @pytest.fixture(scope="module")
@@ -44,12 +49,36 @@ def test_the_row_tells_where_the_report_will_be(task, result):
     assert {"report.json", "report.html"} <= set(result.files)
 
 
+def test_a_gate_says_its_word_in_the_row_and_all_of_it_beside_the_report(task, tmp_path):
+    demands = Demands("Is all well?", Rules(expect=("state=insufficient_data",)))
+
+    result = look_back(replace(task, demands=demands), tmp_path)
+
+    (row,) = result.tables["logs"].to_pylist()
+    told = json.loads(result.files["gate.json"])
+    assert row["gate"] == "passed"
+    assert told["question"] == "Is all well?"
+    assert [one["status"] for one in told["logs"]] == ["passed"]
+
+
+def test_without_a_gate_nothing_is_said_of_one(result):
+    assert result.tables["logs"].column("gate").to_pylist() == [None]
+    assert "gate.json" not in result.files
+
+
 def test_the_costs_are_those_of_a_process_that_worked(result):
     (row,) = result.tables["costs"].to_pylist()
 
     assert row["cpu_s"] > 0
     assert row["wall_s"] > 0
     assert row["peak_mb"] > 50
+
+
+def test_how_often_a_log_was_begun_is_told_by_who_knows(result):
+    told = _with_attempts(result, 3)
+
+    assert told.tables["costs"].column("attempts").to_pylist() == [3]
+    assert told.tables["costs"].schema.equals(result.tables["costs"].schema, check_metadata=True)
 
 
 def test_a_log_that_cannot_be_read_gives_its_line(tmp_path):

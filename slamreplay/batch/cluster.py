@@ -3,34 +3,31 @@
 from __future__ import annotations
 
 import logging
-import pkgutil
-import platform
 import re
 import signal
 import sys
 import warnings
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from multiprocessing import resource_tracker
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from slamreplay.errors import SlamreplayError, UsageError
-from slamreplay.version import __version__
+from slamreplay.batch.versions import ClusterError, check_versions
+from slamreplay.errors import UsageError
 
 if TYPE_CHECKING:
     from distributed import Client, LocalCluster
 
-#: How long a scheduler is looked for, and how long a worker of it is waited for, s.
-_CONNECT_S, _FIRST_WORKER_S = 10.0, 60.0
+#: How long a scheduler is looked for, s.
+_CONNECT_S = 10.0
 #: How often workers of this machine are started.
 _STARTS = 3
 #: How long is enough for saying goodbye, s.
 _CLOSE_S = 10.0
 #: Checked by us, for a client of dask that was refused its address cannot even be closed.
 _ADDRESS = re.compile(r"((tcp|tls|ws|wss|ucx)://)?([^\s:/\[\]]+|\[[0-9a-fA-F:.]+\]):\d{1,5}/?")
-_NUMBER = "slamreplay.version:__version__"
 
 #: For workers of our own. What they hold is small: a log's memory is that of the program, which
 #: spilling cannot free and pausing would only stop for ever. `allowed-failures`: who died of what
@@ -47,10 +44,6 @@ _LOCAL = {
 }
 #: A map that is sent along is as large as it is.
 _CLIENT = {"distributed.admin.large-graph-warning-threshold": "1GiB"}
-
-
-class ClusterError(SlamreplayError):
-    """A cluster that cannot be reached, lacks the program, or went away."""
 
 
 @dataclass(frozen=True)
@@ -207,65 +200,11 @@ def _reached(address: str, patience_s: float) -> Client:
             hint="start one with `dask scheduler`, and `dask worker ADDRESS` beside it",
         ) from error
     try:
-        _check_versions(client, address)
+        check_versions(client, address)
     except BaseException:
         _close(client)
         raise
     return client
-
-
-def _check_versions(client: Client, address: str) -> None:
-    """Whether the other side runs what this side runs: pickles and results depend on it."""
-    try:
-        client.wait_for_workers(1, timeout=_FIRST_WORKER_S)
-    except TimeoutError as error:
-        raise ClusterError(
-            f"the scheduler at {address} has no worker after {_FIRST_WORKER_S:g} s",
-            hint=f"start some with `dask worker {address} --nthreads 1`",
-        ) from error
-    told = client.get_versions()
-    ours = {"python": platform.python_version(), **_packages(told["client"])}
-    others = {"the scheduler": told["scheduler"], **told["workers"]}
-    for name, versions in others.items():
-        if versions is None:
-            continue
-        theirs = {
-            "python": str(versions["host"]["python"]).split(".final")[0],
-            **_packages(versions),
-        }
-        for package, version in ours.items():
-            if _differs(package, theirs.get(package), version):
-                raise ClusterError(
-                    f"{name} runs {package} {theirs.get(package)}, this program {version}",
-                    hint="the same image or environment on both sides",
-                )
-    for name, number in _numbers(client).items():
-        if number != __version__:
-            said = "has no slamreplay" if number is None else f"runs slamreplay {number}"
-            raise ClusterError(
-                f"{name} {said}, this program is {__version__}",
-                hint=f"install slamreplay {__version__} where the workers run",
-            )
-
-
-def _packages(versions: Mapping[str, Any]) -> dict[str, str]:
-    return {name: str(versions["packages"].get(name)) for name in ("dask", "distributed")}
-
-
-def _differs(package: str, theirs: str | None, ours: str) -> bool:
-    if package == "python":  # pickles hold from one patch to the next
-        return str(theirs).split(".")[:2] != ours.split(".")[:2]
-    return theirs != ours
-
-
-def _numbers(client: Client) -> dict[str, str | None]:
-    """Version of slamreplay by worker and of the scheduler, None where there is none."""
-    # A function of Python's own, for one of ours could not even be sent to who lacks us.
-    told = client.run(pkgutil.resolve_name, _NUMBER, on_error="return")
-    with suppress(ModuleNotFoundError):
-        told["the scheduler"] = client.run_on_scheduler(pkgutil.resolve_name, _NUMBER)
-    told.setdefault("the scheduler", None)
-    return {name: v if isinstance(v, str) else None for name, v in told.items()}
 
 
 def _close(ended: Client | LocalCluster) -> None:

@@ -10,8 +10,9 @@ from pathlib import Path
 from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING
 
-from slamreplay.batch.cluster import ClusterError, Connect, Workers, connected
+from slamreplay.batch.cluster import Connect, Workers, connected
 from slamreplay.batch.task import LogResult, LogTask
+from slamreplay.batch.versions import ClusterError
 from slamreplay.batch.work import Work
 from slamreplay.batch.worker import failed, line_of, look_back
 
@@ -81,7 +82,7 @@ def served(client: Client, work: Work, workers: Workers) -> Iterator[LogResult]:
     seen = looked = time.monotonic()
     threads = _threads(client)
     while work.left:
-        while (task := work.next(threads)) is not None:
+        while (task := work.next(max(threads, 1))) is not None:
             future = _sent(client, task)
             out[future] = task
             client.loop.add_callback(_fetch, client, future, ended)

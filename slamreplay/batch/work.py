@@ -38,11 +38,11 @@ class Work:
         A suspect goes out when nothing else is: then its worker's death is its own doing.
 
         Args:
-            threads: of all workers together.
+            threads: of all workers together, at least 1: a cluster may grow with its tasks.
         """
         if self._waiting and len(self._out) < PER_WORKER * threads:
             task = self._waiting.popleft()
-        elif self._suspects and not self._waiting and not self._out and threads:
+        elif self._suspects and not self._waiting and not self._out:
             task = self._suspects.popleft()
             self._alone = task.key
         else:

@@ -59,9 +59,12 @@ def of_a_cluster(folder, target, logs, kills, chance):
             if client is None:
                 client, runs = start(*command), runs + 1
             end = time.monotonic() + chance.uniform(0.2, 5.0)
-            while client.poll() is None and time.monotonic() < end:
+            is_last = sum(killed.values()) >= kills
+            while client.poll() is None and (is_last or time.monotonic() < end):
                 time.sleep(0.02)
-            if client.poll() is not None or sum(killed.values()) >= kills:
+                if is_last:  # workers end by themselves some time after their scheduler
+                    cluster.begin(workers=2)
+            if client.poll() is not None:
                 code, _, err = finished(client, timeout=3600)
                 assert (code, err) == (0, ""), err
                 return killed, runs
