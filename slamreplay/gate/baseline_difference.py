@@ -10,7 +10,7 @@ sqrt(n) times the mean is the mean square of the first nu type II cosine coeffic
     Omega = 1/nu sum_j L_j^2,  L_j = sqrt(2/n) sum_t y_t cos(pi j (t - 1/2) / n),
 
 and mean / sqrt(Omega / n) is Student's t of nu degrees of freedom. They take nu = 0.4 n^(2/3); that
-is too many where a series is slow, so that here nu is a quarter of its independent samples. What
+is too many where a series is slow, so that here nu is a third of its independent samples. What
 this holds and what not was measured: `recipes/ci-gate/baseline.md`.
 """
 
