@@ -335,7 +335,12 @@ def test_noise_passes(tmp_path):
 
 @pytest.mark.parametrize(
     ("size", "gross", "status"),
-    [(0.1, 5.0, "skipped"), (1.0, 5.0, "failed"), (1.0, None, "skipped"), (-1.0, 5.0, "skipped")],
+    [
+        (0.3, 10.0, "skipped"),
+        (1.0, 10.0, "failed"),
+        (1.0, None, "skipped"),
+        (-1.0, 10.0, "skipped"),
+    ],
 )
 def test_what_happened_once_proves_nothing_unless_it_is_gross(tmp_path, size, gross, status):
     base = stored(tmp_path, {"a": log(blocks=0.1 + noise(1, sigma=0.001))})
@@ -444,7 +449,7 @@ def test_nees_is_worse_the_farther_it_is_from_its_degrees_of_freedom():
 
 
 @pytest.mark.parametrize(
-    ("text", "gross"), [("{}", 5.0), ("{gross: 2}", 2.0), ("{gross: null}", None)]
+    ("text", "gross"), [("{}", 10.0), ("{gross: 2}", 2.0), ("{gross: null}", None)]
 )
 def test_a_recipe_says_what_is_gross(tmp_path, text, gross):
     path = tmp_path / "gate.yaml"

@@ -2,7 +2,7 @@
 
 The textbook's t-test takes every block of a log for an independent one. What differs between two
 runs of the same log is a path that was taken a little otherwise, and that lasts: at a correlation
-of 0.9 from block to block the textbook's 0.1 % are 40 %. The mean of a series is therefore held
+of 0.9 from block to block the textbook's 0.1 % are 48 %. The mean of a series is therefore held
 against its long-run variance, by the cosine test that Lazarus, Lewis, Stock and Watson recommend
 (2018, HAR inference: recommendations for practice, JBES 36, 541-559, eq. 10): the variance of
 sqrt(n) times the mean is the mean square of the first nu type II cosine coefficients,
@@ -10,7 +10,7 @@ sqrt(n) times the mean is the mean square of the first nu type II cosine coeffic
     Omega = 1/nu sum_j L_j^2,  L_j = sqrt(2/n) sum_t y_t cos(pi j (t - 1/2) / n),
 
 and mean / sqrt(Omega / n) is Student's t of nu degrees of freedom. They take nu = 0.4 n^(2/3); that
-is too many where a series is slow, so that here nu is a quarter of its independent samples. What
+is too many where a series is slow, so that here nu is a third of its independent samples. What
 this holds and what not was measured: `recipes/ci-gate/baseline.md`.
 """
 

@@ -65,7 +65,7 @@ class BaselineRules:
 
     alpha: float = 0.001
     margins: Mapping[str, float] = field(default_factory=dict)
-    gross: float | None = 5.0
+    gross: float | None = 10.0
 
 
 @dataclass(frozen=True)
