@@ -391,3 +391,16 @@ def test_a_version_is_compared_where_both_ran_alone(tmp_path):
     lost = next(step for step in answers(tmp_path).steps if step.measure == "lost")
     assert (lost.was.count, lost.was.n, lost.now.count, lost.now.n) == (2, 40, 20, 40)
     assert (lost.verdict, lost.sites, lost.robots) == ("worse", 1, 1)
+
+
+@pytest.mark.parametrize(("logs_before", "said"), [(4, "not told apart"), (5, "worse")])
+def test_few_logs_of_a_version_tell_nothing(tmp_path, logs_before, said):
+    later = {"software": "2", "start_ns": DAY0 + HOUR, "state": "lost"}
+    logs = [log_row(f"a{k}", software="1", robot=f"r{k}") for k in range(logs_before)]
+    logs += [log_row(f"b{k}", robot=f"r{k}", **later) for k in range(10)]
+    commit(tmp_path, tables(logs=logs))
+
+    lost = next(step for step in answers(tmp_path).steps if step.measure == "lost")
+
+    assert lost.low > 0
+    assert lost.verdict == said

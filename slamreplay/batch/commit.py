@@ -11,7 +11,7 @@ from slamreplay.batch.folder import map_folder
 from slamreplay.batch.task import LogResult
 from slamreplay.bundle.atomic import atomic_folder
 from slamreplay.fleet.store import commit, read
-from slamreplay.report.writer import MARKER
+from slamreplay.report import REPORT_FILE
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -53,7 +53,7 @@ def commit_result(target: Path, result: LogResult, tell: Tell = silent) -> None:
     """
     (row,) = result.tables["logs"].to_pylist()
     if result.files:
-        _write(target / row["report"], result.files, MARKER)
+        _write(target / row["report"], result.files, REPORT_FILE)
     if result.map_files:
         place = target / map_folder(row["map_version"])
         if not (place / _MAP_MARKER).exists():

@@ -124,11 +124,12 @@ def _report(
 ) -> None:
     from slamreplay.bundle.atomic import check_target
     from slamreplay.bundle.view import check_held_out
+    from slamreplay.report import REPORT_FILE
 
     # All this before the work, not after it.
     threshold = _severity(fail_on)
     check_held_out(hold_out or ())
-    check_target(output, "report.json")
+    check_target(output, REPORT_FILE)
     if update_map is not None:
         from slamreplay.report.map_proposal import check_proposal_target
 

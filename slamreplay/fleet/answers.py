@@ -32,6 +32,11 @@ SPOT_M = 4.0
 NEAR_M = 3.0
 
 
+#: Logs that a software version needs before it is called worse or better: of one log against three
+#: Newcombe's interval may lie on one side of 0, and nobody should act on that.
+LEAST_LOGS = 5
+
+
 @dataclass(frozen=True)
 class Share:
     """How many of how many, with a 95 % interval.
@@ -296,7 +301,9 @@ class Step:
 
     @property
     def verdict(self) -> Literal["worse", "better", "not told apart"]:
-        """What the interval says; every measure is a fault, so more is worse."""
+        """What the interval says of enough logs; every measure is a fault, so more is worse."""
+        if min(self.was.n, self.now.n) < LEAST_LOGS:
+            return "not told apart"
         if self.low is not None and self.low > 0:
             return "worse"
         return "better" if self.high is not None and self.high < 0 else "not told apart"

@@ -13,7 +13,7 @@ from pathlib import Path
 from string import Template
 
 from slamreplay.fleet import areas, changed_regions, course, in_use, picks, spots
-from slamreplay.fleet.answers import DIMENSIONS, NEAR_M, SPOT_M
+from slamreplay.fleet.answers import DIMENSIONS, LEAST_LOGS, NEAR_M, SPOT_M
 from slamreplay.fleet.cells import AGAINST_M2, LOOK_M2, SPOT
 from slamreplay.fleet.intervals import Z
 from slamreplay.fleet.schema import PLACE_M, TABLES
@@ -43,6 +43,7 @@ _VALUES: dict[str, object] = {
     "ONE_KIND": changed_regions.ONE_KIND,
     "IN_USE_DAYS": in_use.DAYS,
     "MOST_PICKS": picks.MOST,
+    "STEP_LOGS": LEAST_LOGS,
     "STOP_S": picks.STOP_S,
     "CHANGED_SHARE": picks.CHANGED_SHARE,
     "UNREADABLE_S": picks.UNREADABLE_S,

@@ -61,11 +61,11 @@ def report(
     from slamreplay.evidence.trace import trace_time
     from slamreplay.postmortem import postmortem
     from slamreplay.report.build import build
-    from slamreplay.report.writer import MARKER, write_report
+    from slamreplay.report.writer import REPORT_FILE, write_report
 
     check_held_out(hold_out)
     if output is not None:
-        check_target(Path(output), MARKER, "output=")
+        check_target(Path(output), REPORT_FILE, "output=")
     options = {"map": map, "topics": topics, "robot": robot, "reference": reference,
                "start": start, "end": end}  # fmt: skip
     of = found(evidence, options, progress)

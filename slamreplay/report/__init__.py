@@ -2,4 +2,7 @@
 
 from slamreplay.stage import callable_stage
 
+#: The file by which the folder of a report is known.
+REPORT_FILE = "report.json"
+
 callable_stage(__name__)

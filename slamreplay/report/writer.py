@@ -8,13 +8,12 @@ from slamreplay.bundle.atomic import atomic_folder
 from slamreplay.bundle.tum import tum
 from slamreplay.evidence.ledger import LEDGER_FILE, ledger_bytes
 from slamreplay.evidence.result import Postmortem
+from slamreplay.report import REPORT_FILE
 from slamreplay.report.build import TRAJECTORY_FILE, build
 from slamreplay.report.changed_map import changed_files
 from slamreplay.report.freshness_file import FRESHNESS_FILE, freshness_bytes
 from slamreplay.report.html import html
 from slamreplay.report.junit import junit_xml
-
-MARKER = "report.json"
 
 
 def write_report(post: Postmortem, target: Path) -> Path:
@@ -33,7 +32,7 @@ def write_report(post: Postmortem, target: Path) -> Path:
         OutputError: the folder is somebody else's or cannot be written.
     """
     content = {
-        MARKER: build(post).json_text().encode(),
+        REPORT_FILE: build(post).json_text().encode(),
         "report.html": html(post).encode(),
         "junit.xml": junit_xml(post).encode(),
     }
@@ -47,7 +46,7 @@ def write_report(post: Postmortem, target: Path) -> Path:
         if changes is not None and changes.freshness is not None:
             frame, clock = post.grid.frame_id, post.manifest.clock.name
             content[FRESHNESS_FILE] = freshness_bytes(changes.freshness, frame=frame, clock=clock)
-    with atomic_folder(target, marker=MARKER) as work:
+    with atomic_folder(target, marker=REPORT_FILE) as work:
         for name, data in content.items():
             (work / name).write_bytes(data)
     return target / "report.html"

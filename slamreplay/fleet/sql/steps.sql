@@ -61,7 +61,10 @@ with versions as (
 select
   before, after, measure, was_count, was_logs, was, now_count, now_logs, now, low, high,
   coalesce(sites, 0) as sites, coalesce(robots, 0) as robots,
-  case when low > 0 then 'worse' when high < 0 then 'better' else 'not told apart' end as verdict
+  case
+    when least(coalesce(was_logs, 0), coalesce(now_logs, 0)) < $STEP_LOGS then 'not told apart'
+    when low > 0 then 'worse' when high < 0 then 'better' else 'not told apart'
+  end as verdict
 from compared left join about using (n)
 where place < 5 or was_count + now_count > 0
 order by n, place, measure;
