@@ -60,8 +60,9 @@ def report(
     from slamreplay.bundle.view import check_held_out
     from slamreplay.evidence.trace import trace_time
     from slamreplay.postmortem import postmortem
+    from slamreplay.report import REPORT_FILE
     from slamreplay.report.build import build
-    from slamreplay.report.writer import REPORT_FILE, write_report
+    from slamreplay.report.writer import write_report
 
     check_held_out(hold_out)
     if output is not None:
