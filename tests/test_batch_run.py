@@ -59,7 +59,7 @@ def test_the_same_again_does_nothing_and_tells_the_same(worked, tmp_path):
     assert first.states == again.states == {"healthy": 1, "lost": 1}
     assert first.failed == again.failed == (("torn.mcap", "it is torn"),)
     assert first.fleet == again.fleet
-    assert first.fleet[0].startswith("Of 3 logs of ")
+    assert first.fleet[0].startswith("Of 3 logs ")
     assert first.fleet[-1] == "1 log could not be read or judged."
     check_whole(tmp_path / "b", done=2, failed=1)
 

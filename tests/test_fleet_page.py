@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 
 from slamreplay.batch import folder as batch_folder
 from slamreplay.fleet.answering import answers as answers_of
-from slamreplay.fleet.answers import Copies, Failure
+from slamreplay.fleet.answers import Copies, Failure, Share
 from slamreplay.fleet.page import headline, lines, remap, words, writer
 from slamreplay.fleet.page.bars import columns, pieces
 from slamreplay.fleet.page.frame import around, frame_of, nice, ticks
@@ -150,6 +150,16 @@ def test_the_sentence_begins_with_what_explains_most_of_the_lost_logs(answers):
     assert "; all of them in one aisle of " in headline.sentence(
         replace(answers, areas=(all_of_them,))
     )
+
+
+def test_a_sentence_of_logs_that_say_little_says_so(answers):
+    total = replace(answers.total, logs=50, robots=0, lost=Share(2, 21, 0.0, 0.3))
+
+    told = headline.sentence(replace(answers, total=total))
+
+    assert told.startswith("Of 50 logs in ")
+    assert " 2 were lost (29 could not be judged)" in told
+    assert "judged" not in headline.sentence(answers)
 
 
 def test_sentences_of_fleets_without_trouble_and_without_logs(answers):

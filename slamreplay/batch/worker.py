@@ -63,7 +63,7 @@ def look_back(task: LogTask, scratch: Path | None = None) -> LogResult:
         with _one_thread():
             return _judged(task, folder, spent)
     except Exception as error:  # one log never stops the others
-        return failed(task, _without(folder, line_of(error)), spent())
+        return failed(task, _told(task, folder, error), spent())
     finally:
         shutil.rmtree(folder, ignore_errors=True)
 
@@ -188,6 +188,15 @@ def _map_files(post: Postmortem) -> Mapping[str, bytes]:
 def _bytes_of(task: LogTask) -> int | None:
     sizes = [file.size for file in task.source.files]
     return None if None in sizes else sum(size or 0 for size in sizes)
+
+
+def _told(task: LogTask, folder: Path, error: Exception) -> str:
+    """The line of a failed log without the log's own path, which is shown beside it anyway."""
+    line = _without(folder, line_of(error))
+    own = [task.source.log]
+    for file in task.source.files:
+        own += [file.url, file.url.removesuffix(file.name).rstrip("/")]
+    return next((line.removeprefix(f"{one}: ") for one in own if line.startswith(f"{one}: ")), line)
 
 
 def _without(folder: Path, line: str) -> str:

@@ -35,12 +35,15 @@ def sentence(answers: Answers) -> str:
     if not total.logs:
         return "There is no log to tell of yet."
     days = sum(group.name is not None for group in answers.by["day"])
-    start = f"f {words.count(total.logs, 'log')} of {words.count(total.robots, 'robot')}"
+    start = f"f {words.logs_of_robots(total)}"
     start += f" in {words.count(days, 'day')}" if days else ""
     lost = total.lost.count
     how = "was" if lost == 1 else "were"
     begin = f"O{start} {lost:,} {how} lost" if lost else f"None o{start} was lost"
-    return f"{begin}{_explained(answers)}."
+    unjudged = total.logs - total.lost.n
+    # Who reads "none was lost" of logs that say nothing is misled.
+    blind = f" ({unjudged:,} could not be judged)" if 2 * unjudged > total.logs else ""
+    return f"{begin}{blind}{_explained(answers)}."
 
 
 def tone(answers: Answers) -> str:

@@ -97,8 +97,8 @@ def view_of(answers: Answers, images: Mapping[str, MapImage]) -> FleetView:
     days = [(g.name, g.states) for g in answers.by["day"] if g.name is not None]
     return FleetView(
         version=__version__,
-        title=f"{words.count(total.logs, 'log')} of {words.count(total.robots, 'robot')} "
-        f"at {words.count(total.sites, 'site')}",
+        title=words.logs_of_robots(total)
+        + (f" at {words.count(total.sites, 'site')}" if total.sites else ""),
         when=words.span_of_days(total.first_day, total.last_day),
         tone=headline.tone(answers),
         sentence=headline.sentence(answers),

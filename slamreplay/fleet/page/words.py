@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from datetime import date
 
-from slamreplay.fleet.answers import Rate, Share
+from slamreplay.fleet.answers import Group, Rate, Share
 from slamreplay.report.phrases import NOT_KNOWN
 
 Box = tuple[float, float, float, float]
@@ -19,6 +19,12 @@ _VERSION_DIGITS = 8
 def count(n: int, one: str, many: str | None = None) -> str:
     """A number of things: "1 log", "2,000 logs"."""
     return f"{n:,} {one if n == 1 else many or f'{one}s'}"
+
+
+def logs_of_robots(group: Group) -> str:
+    """How many logs of how many robots: "72 logs of 12 robots"; the robots only where told."""
+    of = f" of {count(group.robots, 'robot')}" if group.robots else ""
+    return f"{count(group.logs, 'log')}{of}"
 
 
 def label(name: str | None) -> str:
