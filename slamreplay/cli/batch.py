@@ -55,6 +55,12 @@ MemoryLimit = Annotated[
         "--memory-limit", metavar="SIZE", help="A worker beyond it is started anew, as 4GiB."
     ),
 ]
+LogTimeout = Annotated[
+    float,
+    typer.Option(
+        "--log-timeout", metavar="S", help="A log that takes longer fails, in s, fetching included."
+    ),
+]
 Cause = Annotated[
     bool, typer.Option("--cause/--no-cause", help="Replay what went wrong to name its root cause.")
 ]
@@ -78,6 +84,7 @@ def _batch(
     scheduler: Scheduler = None,
     workers: Count = None,
     memory_limit: MemoryLimit = None,
+    log_timeout_s: LogTimeout = 7200.0,
     cause: Cause = True,
     again_failed: AgainFailed = False,
     storage: Storage = None,
@@ -91,7 +98,7 @@ def _batch(
     from slamreplay.batch.stores import storage_options
     from slamreplay.cli.progress import progress_bar
 
-    who = Workers(workers, memory_limit, scheduler).checked()
+    who = Workers(workers, memory_limit, scheduler, log_timeout_s).checked()
     demands = None if recipe is None else read_demands(recipe)
     options = storage_options(storage or ())
     try:

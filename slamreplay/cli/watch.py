@@ -16,6 +16,7 @@ import typer
 from slamreplay.cli.batch import (
     Cause,
     Count,
+    LogTimeout,
     Maps,
     MemoryLimit,
     Output,
@@ -99,6 +100,7 @@ def _watch(
     workers: Count = None,
     memory_limit: MemoryLimit = None,
     scheduler: Scheduler = None,
+    log_timeout_s: LogTimeout = 7200.0,
     cause: Cause = True,
     on_finished: OnFinished = None,
     as_json: Json = False,
@@ -110,7 +112,7 @@ def _watch(
     from slamreplay.batch.watch import Pace, Tally, served, watch
     from slamreplay.batch.whole import completeness
 
-    who = Workers(workers, memory_limit, scheduler).checked()
+    who = Workers(workers, memory_limit, scheduler, log_timeout_s).checked()
     _check_apart(folder, output)
     _check_times(every=every_s, settle=settle_s, give_up=give_up_s)
     hook = _hook(on_finished)
