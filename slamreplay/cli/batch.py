@@ -91,7 +91,7 @@ def _batch(
     as_json: Json = False,
 ) -> None:
     from slamreplay.batch.cluster import Workers
-    from slamreplay.batch.keys import tasks_of
+    from slamreplay.batch.keys import task_maker
     from slamreplay.batch.maps_table import read_maps_table
     from slamreplay.batch.run import run_batch
     from slamreplay.batch.sources import sources_of
@@ -104,7 +104,8 @@ def _batch(
     try:
         table = None if maps is None else read_maps_table(maps, options)
         sources = sources_of(places, table, options, tell=complain)
-        tasks = tasks_of(sources, cause=cause, demands=demands, storage=options)
+        make = task_maker(cause=cause, demands=demands, storage=options)
+        tasks = [make(source) for source in sources]
         with progress_bar("looking back") as progress:
             end = run_batch(
                 tasks, output, who, again_failed=again_failed, progress=progress, tell=complain

@@ -106,7 +106,7 @@ def _watch(
     as_json: Json = False,
 ) -> None:
     from slamreplay.batch.cluster import Workers
-    from slamreplay.batch.keys import task_of
+    from slamreplay.batch.keys import task_maker
     from slamreplay.batch.settling import Patience, Settling
     from slamreplay.batch.stores import storage_options
     from slamreplay.batch.watch import Pace, Tally, served, watch
@@ -136,7 +136,7 @@ def _watch(
                 output,
                 lambda: _sources(folder, maps, options, tell),
                 Settling(Patience(settle_s, give_up_s), completeness),
-                lambda source: task_of(source, cause=cause, demands=demands, storage=options),
+                task_maker(cause=cause, demands=demands, storage=options, keep_s=every_s),
                 lambda scratch: served(who, scratch),
                 pace=Pace(every_s, per_round, is_once=once),
                 tell=complain,
