@@ -1,5 +1,6 @@
 """Clusters that cannot be used: one line that says why, before any log is sent."""
 
+import math
 import sys
 
 import dask
@@ -93,6 +94,9 @@ def test_addresses_of_schedulers_are_taken(address):
     ("workers", "line"),
     [
         (Workers(count=0), "0 workers do no work"),
+        (Workers(log_timeout_s=0.0), "--log-timeout 0 is no time for a log"),
+        (Workers(log_timeout_s=math.nan), "--log-timeout nan is no time for a log"),
+        (Workers(log_timeout_s=math.inf), "--log-timeout inf is no time for a log"),
         (Workers(memory_limit="much"), "'much' is no size"),
         (Workers(memory_limit="3"), "3 is too little"),
         (Workers(count=2, scheduler=ADDRESS), "are for workers of this machine"),

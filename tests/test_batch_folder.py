@@ -1,5 +1,6 @@
 """The folder of a batch: names in it, whose it is, and one program in it at a time."""
 
+import errno
 import json
 import os
 import subprocess
@@ -59,6 +60,38 @@ def test_scratch_of_one_that_was_killed_is_cleared(tmp_path):
         assert not left.exists()
 
 
+def test_what_one_that_was_killed_had_not_finished_is_cleared(tmp_path):
+    target = tmp_path / "b"
+    with batch_folder(target):
+        pass
+    for name in ("logs/.run.mcap-0123.x7", "logs/.run.mcap-0123.x7.old", "maps/.0123.y8"):
+        (target / name).mkdir(parents=True)
+        (target / name / "report.html").write_text("<html>")
+    (target / ".fleet.html.z9").write_text("<html>")
+    (target / "logs" / "run.mcap-4567").mkdir()
+    (target / "fleet.html").write_text("<html></html>")
+
+    with batch_folder(target):
+        left = sorted(path.name for path in target.rglob("*") if path.name != ".scratch")
+
+    assert left == [".lock", "batch.json", "fleet.html", "logs", "maps", "run.mcap-4567"]
+
+
+def test_a_full_disk_is_one_line(tmp_path, monkeypatch):
+    def full(*_arguments):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    with batch_folder(tmp_path / "b"):
+        pass
+    monkeypatch.setattr(os, "write", full)
+
+    with (
+        pytest.raises(OutputError, match=r"\.lock: cannot write: No space left"),
+        batch_folder(tmp_path / "b"),
+    ):
+        pass
+
+
 def test_a_foreign_folder_is_refused(tmp_path):
     (tmp_path / "thesis.tex").write_text("mine")
 
@@ -97,6 +130,27 @@ def test_a_lock_from_another_machine_is_not_taken(tmp_path):
 
     with pytest.raises(OutputError, match=r"elsewhere .* may still be .*remove"), held_lock(path):
         pass
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="asks /proc when a process began")
+def test_where_a_file_system_has_no_locks_the_number_of_a_process_alone_holds_nobody(
+    tmp_path, monkeypatch
+):
+    import fcntl
+
+    def no_locks(*_arguments):
+        raise OSError(errno.ENOLCK, os.strerror(errno.ENOLCK))
+
+    monkeypatch.setattr(fcntl, "flock", no_locks)
+    path = tmp_path / ".lock"
+    with held_lock(path):
+        mine = path.read_text()
+        with pytest.raises(OutputError, match="is at work here"), held_lock(path):
+            pass
+    path.write_text(json.dumps(json.loads(mine) | {"since": "another boot 7"}))
+
+    with held_lock(path):
+        assert path.read_text() == mine
 
 
 def test_a_damaged_lock_holds_nobody_up(tmp_path):

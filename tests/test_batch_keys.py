@@ -6,7 +6,7 @@ from dataclasses import replace
 from hypothesis import given
 from hypothesis import strategies as st
 
-from slamreplay.batch.keys import key_of, task_of
+from slamreplay.batch.keys import key_of, task_maker, task_of
 from slamreplay.batch.local_files import WHOLE, fingerprint
 from slamreplay.batch.named import placed
 from slamreplay.batch.sources import sources_of
@@ -130,3 +130,21 @@ def test_the_map_and_the_topics_file_travel_with_the_task(tmp_path):
         assert task_of(source).key == task.key
     changed = replace(source, map=_map(tmp_path / "else", "x.pgm", "x.pgm"))
     assert task_of(changed).key != task.key
+
+
+def test_logs_of_one_map_share_one_copy_which_is_read_now_and_then(tmp_path):
+    topics, clock = tmp_path / "topics.yaml", [0.0]
+    topics.write_text("one")
+    make = task_maker(keep_s=30.0, now_s=lambda: clock[0])
+    first, second = (
+        make(replace(SOURCE, log=log, topics=str(topics))) for log in ("a.mcap", "b.mcap")
+    )
+    assert second.named is first.named
+
+    clock[0] = 30.0
+    assert make(first.source).named is first.named  # it is the same
+    topics.write_text("other")
+    clock[0] = 59.0
+    assert make(first.source).key == first.key
+    clock[0] = 60.0
+    assert make(first.source).key != first.key

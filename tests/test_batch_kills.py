@@ -68,14 +68,15 @@ def cluster(tmp_path):
         yield cluster
 
 
-def test_a_stopped_client_a_killed_scheduler_and_a_log_that_kills_workers_lose_nothing(
+def test_a_stopped_client_a_killed_scheduler_and_logs_that_cost_their_workers_lose_nothing(
     cluster, tmp_path
 ):
     logs, target = tmp_path / "logs", tmp_path / "batch"
     logs.mkdir()
-    for name in ["a.mcap", "b.mcap", "c.mcap", "d.mcap", "e_poison.mcap", "f.mcap", "g.mcap"]:
-        (logs / name).write_bytes(name.encode())
+    for name in ["a", "b", "c", "d", "e_poison", "f", "g", "h_endless"]:
+        (logs / f"{name}.mcap").write_bytes(name.encode())
     command = ("batch", logs, "-o", target, "--scheduler", cluster.address, "--json")
+    (logs / "hold").touch()
     cluster.begin()
     stopped = start(*command)
     wait_until(lambda: committed(target) >= 1)
@@ -83,19 +84,22 @@ def test_a_stopped_client_a_killed_scheduler_and_a_log_that_kills_workers_lose_n
     code, out, err = finished(stopped)
     assert (code, out) == (130, "")
     assert err == f"stopped; what is done is kept in {target}: the same command again goes on\n"
+    (logs / "hold").unlink()
     cluster.begin()
-    program = start(*command)
+    program = start(*command, "--log-timeout", 5)
     wait_until(lambda: committed(target) >= 3)
     cluster.kill(cluster.scheduler)
     cluster.end()
 
-    cluster.begin(workers=4)  # three of them die
+    cluster.begin(workers=5)  # up to four of them die
 
     code, out, err = finished(program)
     assert (code, err) == (0, "")
     told = json.loads(out)
     assert told["states"] == {"healthy": 6}
-    ((failed),) = told["failed"]
-    assert failed["log"].endswith("e_poison.mcap")
-    assert failed["error"].startswith("its worker died 3 times (hint: it may need more memory")
-    check_whole(target, done=6, failed=1)
+    poison, endless = told["failed"]
+    assert poison["log"].endswith("e_poison.mcap")
+    assert poison["error"].startswith("its worker died 3 times (hint: it may need more memory")
+    assert endless["log"].endswith("h_endless.mcap")
+    assert endless["error"] == "not done after 5 s (hint: see --log-timeout)"
+    check_whole(target, done=6, failed=2)

@@ -373,6 +373,28 @@ def test_what_a_worker_lacked_is_tried_again_ever_later(bench):
     assert bench.rows() == ["a.mcap"]
     assert [one.has_failed for one in bench.finished] == [False]
     assert len([told for told in bench.told if line in told]) == 1
+    assert bench.tally.lacking == {}
+
+
+def test_what_waits_for_another_trial_is_told_at_the_end(bench):
+    line = f"cannot write: {os.strerror(errno.ENOSPC)}"
+    bench.error_of = {"a.mcap": line}
+    bench.steps = [bench.write("a.mcap", mcap()), *[None] * 7]  # two trials, and looks between
+    bench.run()
+    assert (bench.names(), bench.tally.lacking) == (
+        ["a.mcap"] * 3, {str(bench.folder / "a.mcap"): line},
+    )  # fmt: skip
+
+
+def test_of_what_vanished_before_another_trial_nothing_is_left(bench):
+    bench.error_of = {"a.mcap": f"cannot write: {os.strerror(errno.ENOSPC)}"}
+    bench.steps = [
+        bench.write("a.mcap", mcap()), *WAIT, (bench.folder / "a.mcap").unlink, None,
+    ]  # fmt: skip
+    bench.run()
+
+    assert bench.tally.lacking == {}
+    assert bench.rows() == []
 
 
 @pytest.mark.parametrize(

@@ -122,5 +122,12 @@ def test_the_scratch_folder_stands_in_no_line(task, tmp_path, monkeypatch):
     assert look_back(task, tmp_path).error == "run.mcap: no such file"
 
 
+def test_a_worker_whose_disk_is_full_fails_the_log_and_not_the_batch(task, tmp_path):
+    result = look_back(task, tmp_path / "gone")
+
+    assert result.error == "cannot write: No such file or directory, to the folder of its worker"
+    assert result.tables["logs"].column("status").to_pylist() == ["failed"]
+
+
 def test_lack_of_memory_is_no_fault_of_ours():
     assert line_of(MemoryError()).startswith("not enough memory")

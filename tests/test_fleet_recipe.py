@@ -13,6 +13,7 @@ import pytest
 import typer
 import yaml
 
+from slamreplay.batch.folder import batch_folder
 from slamreplay.fleet.schema import arrow_schema
 from slamreplay.fleet.store import commit, read
 from slamreplay.geometry.times import NS_PER_S
@@ -177,6 +178,28 @@ def test_elements_of_a_queue_share_a_manifest(queue, tmp_path, index, size):
     assert sorted(place for part in parts for place in part) == places
 
 
+@pytest.mark.parametrize(
+    ("again", "is_freed"),
+    [
+        ({}, False),
+        ({"SLURM_RESTART_COUNT": "1"}, True),
+        ({"AWS_BATCH_JOB_ATTEMPT": "1"}, False),
+        ({"AWS_BATCH_JOB_ATTEMPT": "2"}, True),
+    ],
+)
+def test_an_element_that_is_sent_again_is_not_held_up_by_its_own_lock(
+    queue, tmp_path, again, is_freed
+):
+    (tmp_path / "logs.txt").write_text("/logs/a.mcap\n", encoding="utf-8")
+    lock = tmp_path / "out" / "slices" / "0" / ".lock"
+    lock.parent.mkdir(parents=True)
+    lock.write_text('{"pid": 7, "host": "the-machine-that-died"}')
+
+    queue(tmp_path / "logs.txt", tmp_path / "out", **again)
+
+    assert lock.exists() != is_freed
+
+
 def test_what_elements_made_is_joined_in_one_folder(queue, tmp_path):
     out = tmp_path / "out"
     for k in range(2):
@@ -187,12 +210,15 @@ def test_what_elements_made_is_joined_in_one_folder(queue, tmp_path):
             report = out / "slices" / str(k) / "logs" / row["key"]
             report.mkdir(parents=True)
             (report / "report.html").write_text(row["key"])
-        (out / "slices" / str(k) / "maps" / "one").mkdir(parents=True)
+        (out / "slices" / str(k) / "batch.json").write_text('{"slamreplay": "batch", "version": 1}')
 
     for _ in range(2):  # and again, once one more element was done
         said = queue("--join", tmp_path / "logs.txt", out)
 
     assert said.startswith(f"batch {tmp_path}/logs.txt --output {out} ")
+    with batch_folder(out):  # it is taken for one of a batch
+        pass
+    assert list((out / "maps").iterdir()) == []  # these logs had none
     assert len(read(out, "logs")) == 6
     assert len(list((out / "tables").iterdir())) == 6
     assert sorted(p.name for p in (out / "logs").iterdir()) == ["00", "01", "02", "10", "11", "12"]

@@ -20,6 +20,9 @@ from slamreplay.errors import UsageError
 if TYPE_CHECKING:
     from distributed import Client, LocalCluster
 
+#: A log may take so long, s: many times what one of a day takes, for it may have to be fetched.
+LOG_TIMEOUT_S = 7200.0
+_LONGEST_S = 31 * 86_400.0
 #: How long a scheduler is looked for, s.
 _CONNECT_S = 10.0
 #: How often workers of this machine are started.
@@ -55,11 +58,13 @@ class Workers:
         memory_limit: of each of them, bytes or as dask takes it (`4GiB`); None is an even share of
             the machine's.
         scheduler: address of a dask scheduler whose workers do it instead.
+        log_timeout_s: a log that takes longer, fetching included, has failed.
     """
 
     count: int | None = None
     memory_limit: str | None = None
     scheduler: str | None = None
+    log_timeout_s: float = LOG_TIMEOUT_S
 
     def checked(self) -> Workers:
         """The same.
@@ -67,6 +72,11 @@ class Workers:
         Raises:
             UsageError: a count, a limit or an address that makes no sense.
         """
+        if not 0 < self.log_timeout_s <= _LONGEST_S:
+            raise UsageError(
+                f"--log-timeout {self.log_timeout_s:g} is no time for a log",
+                hint="in s, a month at most",
+            )
         if self.count is not None and self.count < 1:
             raise UsageError(f"{self.count} workers do no work", hint="--workers 1 or more")
         if self.scheduler is not None and (self.count is not None or self.memory_limit is not None):

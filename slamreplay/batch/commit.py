@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -81,4 +82,7 @@ def _write(folder: Path, files: Mapping[str, bytes], marker: str) -> None:
         for name, content in files.items():
             place = work / name
             place.parent.mkdir(parents=True, exist_ok=True)
-            place.write_bytes(content)
+            with place.open("wb") as stream:
+                stream.write(content)
+                stream.flush()
+                os.fsync(stream.fileno())  # rows that outlive a power cut must have their report

@@ -17,6 +17,7 @@ from slamreplay.errors import OutputError
 #: Marks a folder as ours.
 MARKER = "batch.json"
 REPORTS, MAPS, SCRATCH, LOCK = "logs", "maps", ".scratch", ".lock"
+PAGES = ("fleet.html", "queries.sql")
 VERSION = 1
 
 _NAME_LENGTH = 60
@@ -38,12 +39,26 @@ def batch_folder(target: Path) -> Iterator[Path]:
     _settle_marker(target / MARKER)
     with held_lock(target / LOCK):
         scratch = target / SCRATCH
-        shutil.rmtree(scratch, ignore_errors=True)  # of one that was killed
-        scratch.mkdir()
+        try:
+            _clear(target)
+            scratch.mkdir()
+        except OSError as error:
+            raise OutputError(f"cannot write: {error.strerror or error}", where=target) from error
         try:
             yield scratch
         finally:
             shutil.rmtree(scratch, ignore_errors=True)
+
+
+def _clear(target: Path) -> None:
+    """Remove what one that was killed had not finished."""
+    shutil.rmtree(target / SCRATCH, ignore_errors=True)
+    for folder in (target / REPORTS, target / MAPS):
+        for left in folder.glob(".*"):  # as of `atomic_folder`; names of ours begin with no dot
+            shutil.rmtree(left, ignore_errors=True)
+    for name in (MARKER, *PAGES):
+        for file in target.glob(f".{name}.*"):  # as of `write_file`
+            file.unlink(missing_ok=True)
 
 
 def report_folder(task: LogTask) -> str:

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping, Sequence
+import math
+import time
+from collections.abc import Callable, Mapping
 from dataclasses import asdict
 from functools import lru_cache
 from typing import TYPE_CHECKING
@@ -24,41 +26,44 @@ def task_of(
     demands: Demands | None = None,
     storage: Mapping[str, object] | None = None,
 ) -> LogTask:
-    """The task of looking back on a log, with the small files it needs.
-
-    Args:
-        source: the log.
-        cause: replay what went wrong.
-        demands: of a gate.
-        storage: options of fsspec.
-
-    Raises:
-        MapError: the map that the table names cannot be read.
-        UsageError: the topics file cannot, or they are too large.
-    """
-    named = named_files(source, storage or {})
-    key = key_of(source, cause=cause, demands=demands, named=named)
-    return LogTask(key, source, cause, demands, dict(storage or {}), named)
+    """The task of looking back on one log; arguments and errors as of `task_maker`."""
+    return task_maker(cause=cause, demands=demands, storage=storage)(source)
 
 
-def tasks_of(
-    sources: Sequence[LogSource],
+def task_maker(
     *,
     cause: bool = True,
     demands: Demands | None = None,
     storage: Mapping[str, object] | None = None,
-) -> list[LogTask]:
-    """The tasks of many logs, as of `task_of`; those of one map share one copy of it."""
+    keep_s: float = math.inf,
+    now_s: Callable[[], float] = time.monotonic,
+) -> Callable[[LogSource], LogTask]:
+    """Gives the task of looking back on a log, with the small files it needs.
+
+    Logs of one map share one copy of it. What is given raises `MapError` where the map that the
+    table names cannot be read, `UsageError` where the topics file cannot, or they are too large.
+
+    Args:
+        cause: replay what went wrong.
+        demands: of a gate.
+        storage: options of fsspec.
+        keep_s: so long a map or topics file is taken to be what it was, s.
+        now_s: a clock that never goes back, s.
+    """
     storage = dict(storage or {})
-    read: dict[tuple[str | None, str | None], Mapping[str, bytes]] = {}
-    tasks = []
-    for source in sources:
-        place = source.map, source.topics
-        if place not in read:
-            read[place] = named_files(source, storage)
-        key = key_of(source, cause=cause, demands=demands, named=read[place])
-        tasks.append(LogTask(key, source, cause, demands, storage, read[place]))
-    return tasks
+    read: dict[tuple[str | None, str | None], tuple[float, Mapping[str, bytes]]] = {}
+
+    def make(source: LogSource) -> LogTask:
+        place, now = (source.map, source.topics), now_s()
+        since_s, named = read.get(place, (-math.inf, {}))
+        if now - since_s >= keep_s or place not in read:
+            found = named_files(source, storage)
+            named = named if found == named else found  # one copy, as long as it is the same
+            read[place] = now, named
+        key = key_of(source, cause=cause, demands=demands, named=named)
+        return LogTask(key, source, cause, demands, storage, named)
+
+    return make
 
 
 def key_of(

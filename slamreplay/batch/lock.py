@@ -7,7 +7,7 @@ import os
 import socket
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -30,23 +30,29 @@ def held_lock(path: Path) -> Iterator[None]:
         raise OutputError(f"cannot write: {error.strerror or error}", where=path) from error
     try:
         holder = _holder(handle)
-        told = f"process {holder.get('pid', '?')} on {holder.get('host', '?')}"
+        who = f"process {holder.get('pid', '?')} on {holder.get('host', '?')}"
         here = socket.gethostname()
         if not _locked(handle, holder):
             raise OutputError(
-                f"{told} is at work here", where=path.parent, hint="wait for it, or stop it"
+                f"{who} is at work here", where=path.parent, hint="wait for it, or stop it"
             )
         if holder.get("host", here) != here:
             raise OutputError(
-                f"{told} was at work here and may still be",
+                f"{who} was at work here and may still be",
                 where=path.parent,
                 hint=f"if it is not, remove {path}",
             )
-        _write(handle, json.dumps({"pid": os.getpid(), "host": here}).encode())
+        pid = os.getpid()
+        try:
+            told = {"pid": pid, "host": here, "since": _since(pid)}
+            _write(handle, json.dumps(told).encode())
+        except OSError as error:
+            raise OutputError(f"cannot write: {error.strerror or error}", where=path) from error
         try:
             yield
         finally:
-            _write(handle, b"")  # the file stays: to remove it would part those who wait for it
+            with suppress(OSError):  # the file stays: to remove it would part those who wait for it
+                _write(handle, b"")
     finally:
         os.close(handle)
 
@@ -88,11 +94,13 @@ else:
         except BlockingIOError:
             return False
         except OSError:  # this file system has no locks: the process itself is asked
-            return not (holder.get("host") == socket.gethostname() and _lives(holder.get("pid")))
+            return not (holder.get("host") == socket.gethostname() and _lives(holder))
         return True
 
 
-def _lives(pid: object) -> bool:
+def _lives(holder: dict[str, Any]) -> bool:
+    """Whether the process still is who wrote this: numbers are given anew, soon after a boot."""
+    pid = holder.get("pid")
     if not isinstance(pid, int):
         return False
     try:
@@ -100,5 +108,16 @@ def _lives(pid: object) -> bool:
     except ProcessLookupError:
         return False
     except PermissionError:
-        return True
-    return True
+        pass
+    now, then = _since(pid), holder.get("since")
+    return now is None or then is None or now == then
+
+
+def _since(pid: int) -> str | None:
+    """The boot and the clock tick in it at which a process began, None where nobody tells."""
+    try:
+        boot = Path("/proc/sys/kernel/random/boot_id").read_text(encoding="utf-8").strip()
+        about = Path(f"/proc/{pid}/stat").read_text(encoding="utf-8")
+        return f"{boot} {about.rpartition(')')[2].split()[19]}"  # field 22 of proc_pid_stat(5)
+    except (OSError, IndexError):
+        return None

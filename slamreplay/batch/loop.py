@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 import uuid
 from collections.abc import Generator, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from queue import Empty, SimpleQueue
@@ -12,9 +13,10 @@ from typing import TYPE_CHECKING
 
 from slamreplay.batch.cluster import Connect, Workers, connected
 from slamreplay.batch.task import LogResult, LogTask
+from slamreplay.batch.time_limit import look_back_in_time
 from slamreplay.batch.versions import ClusterError
 from slamreplay.batch.work import Work
-from slamreplay.batch.worker import failed, line_of, look_back
+from slamreplay.batch.worker import failed, line_of
 
 if TYPE_CHECKING:
     from distributed import Client, Future
@@ -25,6 +27,8 @@ if TYPE_CHECKING:
 _LOOK_S = 1.0
 #: How long a scheduler that went away is looked for, and how long workers may be missing, s.
 RECONNECT_S, WITHOUT_WORKERS_S = 120.0, 600.0
+#: News of a beginning may take longer than that of an end.
+_NEARLY = 0.9
 _KEPT = "what is done is kept: run the same command again"
 
 
@@ -79,33 +83,47 @@ def served(client: Client, work: Work, workers: Workers) -> Iterator[LogResult]:
     """
     out: dict[Future, LogTask] = {}
     ended: SimpleQueue[_Ended] = SimpleQueue()
+    begun: dict[str, float] = {}
+    topic = f"slamreplay-{uuid.uuid4().hex}"
     seen = looked = time.monotonic()
     threads = _threads(client)
-    while work.left:
-        while (task := work.next(max(threads, 1))) is not None:
-            future = _sent(client, task)
-            out[future] = task
-            client.loop.add_callback(_fetch, client, future, ended)
-        try:
-            end = ended.get(timeout=_LOOK_S)
-        except Empty:
-            end = None
-        now = time.monotonic()
-        if end is None or now - looked > _LOOK_S:
-            threads, looked = _threads(client), now
-            seen = now if threads else seen
-            if now - seen > WITHOUT_WORKERS_S:
-                raise ClusterError(
-                    f"no worker for {WITHOUT_WORKERS_S:g} s", where=workers.scheduler, hint=_KEPT
-                )
-            if any(sent.cancelled() for sent in out):
-                raise _LostError
-        if end is not None:
-            future, came = end
-            result = _outcome(came, out.pop(future), work, workers)
-            future.release()
-            if result is not None:
-                yield result
+    try:
+        client.subscribe_topic(topic, lambda event: begun.update({event[1]: time.monotonic()}))
+        while work.left:
+            while (task := work.next(max(threads, 1))) is not None:
+                future = _sent(client, task, workers, topic)
+                out[future] = task
+                client.loop.add_callback(_fetch, client, future, ended)
+            try:
+                end = ended.get(timeout=_LOOK_S)
+            except Empty:
+                end = None
+            now = time.monotonic()
+            if end is None or now - looked > _LOOK_S:
+                threads, looked = _threads(client), now
+                seen = now if threads else seen
+                if now - seen > WITHOUT_WORKERS_S:
+                    raise ClusterError(
+                        f"no worker for {WITHOUT_WORKERS_S:g} s",
+                        where=workers.scheduler,
+                        hint=_KEPT,
+                    )
+                if any(sent.cancelled() for sent in out):
+                    raise _LostError
+            if end is not None:
+                future, came = end
+                task = out.pop(future)
+                took_s = now - begun.pop(task.key, now)
+                result = _outcome(came, task, work, workers, took_s)
+                future.release()
+                if result is not None:
+                    yield result
+    finally:
+        for future in out:  # a client that stays must not have done what nobody waits for
+            with suppress(Exception):
+                future.release()
+        with suppress(Exception):
+            client.unsubscribe_topic(topic)
 
 
 async def _fetch(client: Client, future: Future, ended: SimpleQueue[_Ended]) -> None:
@@ -114,18 +132,25 @@ async def _fetch(client: Client, future: Future, ended: SimpleQueue[_Ended]) -> 
     One that dies before its result was fetched is asked for it for half a minute; then dask has
     the task done again.
     """
+    from distributed import CancelledError
+
     try:
         (result,) = await client.gather([future], asynchronous=True)
         ended.put((future, result))
+    except (CancelledError, OSError, TimeoutError) as error:
+        # Of a task that failed it is its own error, and says nothing about the scheduler.
+        ended.put((future, error if future.status == "error" else _LostError()))
     except Exception as error:
         ended.put((future, error))
 
 
-def _sent(client: Client, task: LogTask) -> Future:
+def _sent(client: Client, task: LogTask, workers: Workers, topic: str) -> Future:
     # The same task may go out several times, and dask takes one key for one result.
     key = f"look_back-{task.key}-{uuid.uuid4().hex[:8]}"
     try:
-        return client.submit(look_back, task, key=key, pure=False)
+        return client.submit(
+            look_back_in_time, task, workers.log_timeout_s, topic, key=key, pure=False
+        )
     except OSError as error:
         raise _LostError from error
 
@@ -141,16 +166,20 @@ def _threads(client: Client) -> int:
 
 
 def _outcome(
-    came: LogResult | Exception, task: LogTask, work: Work, workers: Workers
+    came: LogResult | Exception, task: LogTask, work: Work, workers: Workers, took_s: float
 ) -> LogResult | None:
-    """The result of a task that ended; None if it goes out again."""
-    from distributed import CancelledError, KilledWorker
+    """The result of a task that ended after so long; None if it goes out again."""
+    from distributed import KilledWorker
 
     if isinstance(came, LogResult):
         work.done(task.key)
         return _with_attempts(came, work.deaths[task.key] + 1)
-    if isinstance(came, (CancelledError, OSError, TimeoutError)):
-        raise _LostError from came
+    if isinstance(came, _LostError):
+        raise came
+    limit_s = workers.log_timeout_s
+    if isinstance(came, KilledWorker) and took_s >= _NEARLY * limit_s:
+        work.done(task.key)  # its worker ended itself, as it would every time
+        return failed(task, f"not done after {limit_s:g} s (hint: see --log-timeout)")
     deaths = came.allowed_failures + 1 if isinstance(came, KilledWorker) else 1
     if not work.died(task.key, deaths):
         return None

@@ -38,6 +38,7 @@ _PASSING = (
     "does not answer", "the server answers", "no room to copy it to", "access denied",
     "there are no credentials for it",
 )  # fmt: skip
+_PUT_OFF = "put off "
 #: The longest time between two trials of such a log, s.
 _LONGEST_S = 3600.0
 
@@ -194,6 +195,10 @@ class _Rounds:
             w for w in self.told if w.startswith("lacks ") and w[6:] not in looked.lacking
         ]:
             del self.told[what]
+        there = {source.log for source in sources}
+        for log in [log for log in self.tried if log not in there]:
+            self._forget(log)
+        self.tally.lacking |= {log: self.told[_PUT_OFF + log] for log in self.tried}
         return looked
 
     def play(self, looked: Looked, *, is_first: bool) -> bool:
@@ -212,6 +217,7 @@ class _Rounds:
                 continue
             if task.key in self.done:
                 self.settling.take(source)
+                self._forget(source.log)
                 known.append(task)
             else:
                 todo.setdefault(task.key, (task, source))
@@ -270,6 +276,7 @@ class _Rounds:
             return
         self.written(lambda: commit_result(self.target, result, self.tell))
         self.done.add(result.key)
+        self._forget(source.log)
         if not is_other:
             self.settling.take(source)
         one = _finished(self.target, result)
@@ -284,7 +291,15 @@ class _Rounds:
         wait_s = min(self.pace.every_s * 2.0 ** min(times - 1, 30), _LONGEST_S)
         self.not_before_s[source.log] = self.settling.now_s() + wait_s
         self.tally.lacking[source.log] = why
-        self._tell(f"put off {source.log}", f"{source.log}: {why}; trying it again later")
+        if self.told.get(_PUT_OFF + source.log) != why:
+            self.told[_PUT_OFF + source.log] = why
+            self.tell(f"{source.log}: {why}; trying it again later")
+
+    def _forget(self, log: str) -> None:
+        """That it was put off; of what came and went in a year nothing is left."""
+        for about in (self.tried, self.not_before_s, self.tally.lacking):
+            about.pop(log, None)
+        self.told.pop(_PUT_OFF + log, None)
 
     def _tell(self, what: str, line: str) -> None:
         """Tell what hinders once, and that it no longer does; an empty line: it does not."""

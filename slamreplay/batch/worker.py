@@ -58,7 +58,12 @@ def look_back(task: LogTask, scratch: Path | None = None) -> LogResult:
         The same bytes for the same task, but for the table `costs`.
     """
     spent = _stopwatch()
-    folder = Path(tempfile.mkdtemp(prefix="slamreplay-", dir=scratch or _worker_folder()))
+    scratch = scratch or _worker_folder()
+    try:
+        folder = Path(tempfile.mkdtemp(prefix="slamreplay-", dir=scratch))
+    except OSError as error:
+        line = f"cannot write: {error.strerror or error}, to the folder of its worker"
+        return failed(task, line, spent())
     try:
         with _one_thread():
             return _judged(task, folder, spent)
@@ -206,14 +211,14 @@ def _without(folder: Path, line: str) -> str:
     return line
 
 
-def _worker_folder() -> str | None:
+def _worker_folder() -> Path | None:
     """The folder of this dask worker: dask clears those of workers that were killed."""
     if "distributed" not in sys.modules:
         return None
     from distributed import get_worker
 
     try:
-        return str(get_worker().local_directory)
+        return Path(get_worker().local_directory)
     except ValueError:
         return None
 

@@ -55,6 +55,12 @@ MemoryLimit = Annotated[
         "--memory-limit", metavar="SIZE", help="A worker beyond it is started anew, as 4GiB."
     ),
 ]
+LogTimeout = Annotated[
+    float,
+    typer.Option(
+        "--log-timeout", metavar="S", help="A log that takes longer fails, in s, fetching included."
+    ),
+]
 Cause = Annotated[
     bool, typer.Option("--cause/--no-cause", help="Replay what went wrong to name its root cause.")
 ]
@@ -78,26 +84,28 @@ def _batch(
     scheduler: Scheduler = None,
     workers: Count = None,
     memory_limit: MemoryLimit = None,
+    log_timeout_s: LogTimeout = 7200.0,
     cause: Cause = True,
     again_failed: AgainFailed = False,
     storage: Storage = None,
     as_json: Json = False,
 ) -> None:
     from slamreplay.batch.cluster import Workers
-    from slamreplay.batch.keys import tasks_of
+    from slamreplay.batch.keys import task_maker
     from slamreplay.batch.maps_table import read_maps_table
     from slamreplay.batch.run import run_batch
     from slamreplay.batch.sources import sources_of
     from slamreplay.batch.stores import storage_options
     from slamreplay.cli.progress import progress_bar
 
-    who = Workers(workers, memory_limit, scheduler).checked()
+    who = Workers(workers, memory_limit, scheduler, log_timeout_s).checked()
     demands = None if recipe is None else read_demands(recipe)
     options = storage_options(storage or ())
     try:
         table = None if maps is None else read_maps_table(maps, options)
         sources = sources_of(places, table, options, tell=complain)
-        tasks = tasks_of(sources, cause=cause, demands=demands, storage=options)
+        make = task_maker(cause=cause, demands=demands, storage=options)
+        tasks = [make(source) for source in sources]
         with progress_bar("looking back") as progress:
             end = run_batch(
                 tasks, output, who, again_failed=again_failed, progress=progress, tell=complain

@@ -16,6 +16,7 @@ import typer
 from slamreplay.cli.batch import (
     Cause,
     Count,
+    LogTimeout,
     Maps,
     MemoryLimit,
     Output,
@@ -99,18 +100,19 @@ def _watch(
     workers: Count = None,
     memory_limit: MemoryLimit = None,
     scheduler: Scheduler = None,
+    log_timeout_s: LogTimeout = 7200.0,
     cause: Cause = True,
     on_finished: OnFinished = None,
     as_json: Json = False,
 ) -> None:
     from slamreplay.batch.cluster import Workers
-    from slamreplay.batch.keys import task_of
+    from slamreplay.batch.keys import task_maker
     from slamreplay.batch.settling import Patience, Settling
     from slamreplay.batch.stores import storage_options
     from slamreplay.batch.watch import Pace, Tally, served, watch
     from slamreplay.batch.whole import completeness
 
-    who = Workers(workers, memory_limit, scheduler).checked()
+    who = Workers(workers, memory_limit, scheduler, log_timeout_s).checked()
     _check_apart(folder, output)
     _check_times(every=every_s, settle=settle_s, give_up=give_up_s)
     hook = _hook(on_finished)
@@ -134,7 +136,7 @@ def _watch(
                 output,
                 lambda: _sources(folder, maps, options, tell),
                 Settling(Patience(settle_s, give_up_s), completeness),
-                lambda source: task_of(source, cause=cause, demands=demands, storage=options),
+                task_maker(cause=cause, demands=demands, storage=options, keep_s=every_s),
                 lambda scratch: served(who, scratch),
                 pace=Pace(every_s, per_round, is_once=once),
                 tell=complain,
