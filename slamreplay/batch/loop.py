@@ -12,6 +12,7 @@ from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING
 
 from slamreplay.batch.cluster import Connect, Workers, connected
+from slamreplay.batch.stopping import check_stopped
 from slamreplay.batch.task import LogResult, LogTask
 from slamreplay.batch.time_limit import look_back_in_time
 from slamreplay.batch.versions import ClusterError
@@ -71,6 +72,7 @@ def looked_back(
         if lost is not None:
             if time.monotonic() - lost > RECONNECT_S:
                 raise ClusterError("the scheduler went away", where=workers.scheduler, hint=_KEPT)
+            check_stopped()
             time.sleep(_LOOK_S)
 
 
@@ -94,6 +96,7 @@ def served(client: Client, work: Work, workers: Workers) -> Iterator[LogResult]:
                 future = _sent(client, task, workers, topic)
                 out[future] = task
                 client.loop.add_callback(_fetch, client, future, ended)
+            check_stopped()
             try:
                 end = ended.get(timeout=_LOOK_S)
             except Empty:

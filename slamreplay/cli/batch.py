@@ -17,7 +17,9 @@ if TYPE_CHECKING:
 
 #: So many failed logs are told with their line; all of them stand in the tables.
 _MOST_FAILED = 10
-_UNREADABLE, _INTERRUPTED = 2, 130
+_UNREADABLE = 2
+#: As shells tell of what a signal ended.
+INTERRUPTED, TERMINATED = 130, 143
 
 Places = Annotated[
     list[str],
@@ -95,6 +97,7 @@ def _batch(
     from slamreplay.batch.maps_table import read_maps_table
     from slamreplay.batch.run import run_batch
     from slamreplay.batch.sources import sources_of
+    from slamreplay.batch.stopping import Stopped, stoppable
     from slamreplay.batch.stores import storage_options
     from slamreplay.cli.progress import progress_bar
 
@@ -102,17 +105,18 @@ def _batch(
     demands = None if recipe is None else read_demands(recipe)
     options = storage_options(storage or ())
     try:
-        table = None if maps is None else read_maps_table(maps, options)
-        sources = sources_of(places, table, options, tell=complain)
-        make = task_maker(cause=cause, demands=demands, storage=options)
-        tasks = [make(source) for source in sources]
-        with progress_bar("looking back") as progress:
-            end = run_batch(
-                tasks, output, who, again_failed=again_failed, progress=progress, tell=complain
-            )
-    except KeyboardInterrupt:
+        with stoppable():
+            table = None if maps is None else read_maps_table(maps, options)
+            sources = sources_of(places, table, options, tell=complain)
+            make = task_maker(cause=cause, demands=demands, storage=options)
+            tasks = [make(source) for source in sources]
+            with progress_bar("looking back") as progress:
+                end = run_batch(
+                    tasks, output, who, again_failed=again_failed, progress=progress, tell=complain
+                )
+    except Stopped as stop:
         complain(f"stopped; what is done is kept in {output}: the same command again goes on")
-        raise typer.Exit(_INTERRUPTED) from None
+        raise typer.Exit(TERMINATED if stop.is_terminated else INTERRUPTED) from None
     if as_json:
         say_json(_as_json(end, output))
     else:

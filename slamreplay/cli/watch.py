@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import os
 import re
-import signal
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from slamreplay.cli.batch import (
+    INTERRUPTED,
+    TERMINATED,
     Cause,
     Count,
     LogTimeout,
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from slamreplay.batch.task import LogSource
     from slamreplay.batch.watch import Finished, Tally
 
-_FAILED, _UNREADABLE, _INTERRUPTED, _TERMINATED = 1, 2, 130, 143
+_FAILED, _UNREADABLE = 1, 2
 #: So many logs are done between two looks, or so many of each worker where those are more: at the
 #: end of a round some wait for the last one.
 _PER_ROUND, _PER_WORKER, _PER_ROUND_OF_CLUSTER = 32, 8, 512
@@ -76,10 +76,6 @@ OnFinished = Annotated[
 ]
 
 
-class _Terminated(KeyboardInterrupt):
-    """SIGTERM: a service is to end."""
-
-
 def register(app: typer.Typer) -> None:
     """Add the command."""
     app.command(name="watch", help="Look back on logs of a folder as they become whole, for ever.")(
@@ -108,6 +104,7 @@ def _watch(
     from slamreplay.batch.cluster import Workers
     from slamreplay.batch.keys import task_maker
     from slamreplay.batch.settling import Patience, Settling
+    from slamreplay.batch.stopping import Stopped, stoppable
     from slamreplay.batch.stores import storage_options
     from slamreplay.batch.watch import Pace, Tally, served, watch
     from slamreplay.batch.whole import completeness
@@ -131,7 +128,7 @@ def _watch(
         hook(told)
 
     try:
-        with _terminable():
+        with stoppable():
             watch(
                 output,
                 lambda: _sources(folder, maps, options, tell),
@@ -144,11 +141,11 @@ def _watch(
                 finish_round=lambda: _write_page(output, tell),
                 tally=tally,
             )
-    except KeyboardInterrupt as stop:
+    except Stopped as stop:
         _show(tally, output)
-        if not isinstance(stop, _Terminated):
-            raise typer.Exit(_INTERRUPTED) from None
-        raise typer.Exit(_TERMINATED if once else 0) from None
+        if not stop.is_terminated:
+            raise typer.Exit(INTERRUPTED) from None
+        raise typer.Exit(TERMINATED if once else 0) from None
     _show(tally, output)
     if tally.failed or tally.gate_failed:
         raise typer.Exit(_UNREADABLE if tally.failed else _FAILED)
@@ -202,21 +199,6 @@ def _write_page(output: Path, tell: Callable[[str], None]) -> None:
     from slamreplay.fleet.page.writer import write_fleet_page
 
     write_fleet_page(output, warn=tell)
-
-
-@contextmanager
-def _terminable() -> Iterator[None]:
-    """Within it SIGTERM ends what goes on as Ctrl-C does."""
-
-    def end(_number: int, _frame: Any) -> None:
-        signal.signal(signal.SIGTERM, signal.SIG_IGN)  # told once is enough
-        raise _Terminated
-
-    before = signal.signal(signal.SIGTERM, end)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, before)
 
 
 def _hook(command: str | None) -> Callable[[dict[str, object]], None]:

@@ -48,14 +48,14 @@ def read_recipe(path: Path) -> Recipe:
                          hint="a recipe asks one question")  # fmt: skip
     if kinds:
         return _KINDS[kinds[0]](given, path)
-    if any(key in given for key in GATE_KEYS):
-        return gate_recipe(given, path)
     known = {**LabFile.model_fields, **DoseFile.model_fields, **BudgetFile.model_fields,
              **GateFile.model_fields}  # fmt: skip
     for key in given:
         if key not in known:
             what, hint = unknown_key(key, known)
             raise UsageError(what, where=path, hint=hint)
+    if any(key in given for key in GATE_KEYS):
+        return gate_recipe(given, path)
     raise UsageError(
         "the key 'lab', 'perturbations' or 'budget' is missing", where=path,
         hint=f"lab: one of {', '.join(LABS)}; perturbations: a list of name and levels; budget: "

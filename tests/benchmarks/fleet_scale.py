@@ -1,6 +1,6 @@
 """How long a fleet's tables take with a hundred thousand logs, and how much memory.
 
-    python tests/benchmarks/fleet_tables.py FOLDER [LOGS] [PLACES]
+    python tests/benchmarks/fleet_scale.py FOLDER [LOGS] [PLACES]
 
 writes LOGS (100000) logs of 100 sites with PLACES (150) places each into FOLDER, 500 at a time, and
 asks everything of them. Every number is of one process; memory is the greatest so far.
