@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from slamreplay.cli.options import Json
+from slamreplay.cli.stopping import code_of, terminable
 from slamreplay.cli.terminal import complain, say, say_json, say_path
 from slamreplay.errors import UsageError
 
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
 
 #: So many failed logs are told with their line; all of them stand in the tables.
 _MOST_FAILED = 10
-_UNREADABLE, _INTERRUPTED = 2, 130
+_UNREADABLE = 2
 
 Places = Annotated[
     list[str],
@@ -106,13 +107,13 @@ def _batch(
         sources = sources_of(places, table, options, tell=complain)
         make = task_maker(cause=cause, demands=demands, storage=options)
         tasks = [make(source) for source in sources]
-        with progress_bar("looking back") as progress:
+        with terminable(), progress_bar("looking back") as progress:
             end = run_batch(
                 tasks, output, who, again_failed=again_failed, progress=progress, tell=complain
             )
-    except KeyboardInterrupt:
+    except KeyboardInterrupt as stop:
         complain(f"stopped; what is done is kept in {output}: the same command again goes on")
-        raise typer.Exit(_INTERRUPTED) from None
+        raise typer.Exit(code_of(stop)) from None
     if as_json:
         say_json(_as_json(end, output))
     else:

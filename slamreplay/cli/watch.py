@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import os
 import re
-import signal
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -26,6 +24,7 @@ from slamreplay.cli.batch import (
     read_demands,
 )
 from slamreplay.cli.options import Json
+from slamreplay.cli.stopping import TERMINATED, code_of, terminable
 from slamreplay.cli.terminal import complain, say_json
 from slamreplay.errors import LogError, UsageError
 
@@ -33,7 +32,7 @@ if TYPE_CHECKING:
     from slamreplay.batch.task import LogSource
     from slamreplay.batch.watch import Finished, Tally
 
-_FAILED, _UNREADABLE, _INTERRUPTED, _TERMINATED = 1, 2, 130, 143
+_FAILED, _UNREADABLE = 1, 2
 #: So many logs are done between two looks, or so many of each worker where those are more: at the
 #: end of a round some wait for the last one.
 _PER_ROUND, _PER_WORKER, _PER_ROUND_OF_CLUSTER = 32, 8, 512
@@ -74,10 +73,6 @@ OnFinished = Annotated[
         "--on-finished", metavar="COMMAND", help="Run for each log, with JSON on its stdin."
     ),
 ]
-
-
-class _Terminated(KeyboardInterrupt):
-    """SIGTERM: a service is to end."""
 
 
 def register(app: typer.Typer) -> None:
@@ -131,7 +126,7 @@ def _watch(
         hook(told)
 
     try:
-        with _terminable():
+        with terminable():
             watch(
                 output,
                 lambda: _sources(folder, maps, options, tell),
@@ -146,9 +141,8 @@ def _watch(
             )
     except KeyboardInterrupt as stop:
         _show(tally, output)
-        if not isinstance(stop, _Terminated):
-            raise typer.Exit(_INTERRUPTED) from None
-        raise typer.Exit(_TERMINATED if once else 0) from None
+        is_asked_to = code_of(stop) == TERMINATED and not once  # the end of a service
+        raise typer.Exit(0 if is_asked_to else code_of(stop)) from None
     _show(tally, output)
     if tally.failed or tally.gate_failed:
         raise typer.Exit(_UNREADABLE if tally.failed else _FAILED)
@@ -202,21 +196,6 @@ def _write_page(output: Path, tell: Callable[[str], None]) -> None:
     from slamreplay.fleet.page.writer import write_fleet_page
 
     write_fleet_page(output, warn=tell)
-
-
-@contextmanager
-def _terminable() -> Iterator[None]:
-    """Within it SIGTERM ends what goes on as Ctrl-C does."""
-
-    def end(_number: int, _frame: Any) -> None:
-        signal.signal(signal.SIGTERM, signal.SIG_IGN)  # told once is enough
-        raise _Terminated
-
-    before = signal.signal(signal.SIGTERM, end)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, before)
 
 
 def _hook(command: str | None) -> Callable[[dict[str, object]], None]:
