@@ -45,7 +45,7 @@ def test_a_killed_worker_and_a_killed_client_lose_nothing(place, tmp_path):
     workers = workers_of(first)
     kill(first.pid)
     first.communicate()
-    wait_until(lambda: not any(map(lives, workers)), timeout=10)
+    wait_until(lambda: not any(map(lives, workers)))
     kept = committed(target)
 
     code, out, err = finished(start(*command))
@@ -80,9 +80,10 @@ def test_a_stopped_client_a_killed_scheduler_and_logs_that_cost_their_workers_lo
     cluster.begin()
     stopped = start(*command)
     wait_until(lambda: committed(target) >= 1)
-    stopped.send_signal(signal.SIGINT)
+    stopped.send_signal(signal.SIGTERM)
     code, out, err = finished(stopped)
-    assert (code, out) == (130, "")
+    assert (code, out) == (143, "")
+    assert (target / ".lock").read_text() == ""  # who goes on may do so on another machine
     assert err == f"stopped; what is done is kept in {target}: the same command again goes on\n"
     (logs / "hold").unlink()
     cluster.begin()
