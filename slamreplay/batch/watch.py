@@ -21,6 +21,7 @@ from slamreplay.batch.folder import batch_folder
 from slamreplay.batch.loop import looked_back
 from slamreplay.batch.relabel import relabel
 from slamreplay.batch.settling import Looked, Settling, is_there
+from slamreplay.batch.stopping import check_stopped
 from slamreplay.batch.task import LogResult, LogSource, LogTask
 from slamreplay.batch.worker import line_of
 from slamreplay.errors import OutputError, SlamreplayError
@@ -155,6 +156,7 @@ def watch(
             if pace.is_once and not has_more:
                 return tally
             is_first = False
+            check_stopped()
             if not has_more:
                 sleep(pace.every_s)
 
