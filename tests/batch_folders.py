@@ -34,12 +34,18 @@ def start(*arguments, **how):
     """The program, in a process group of its own as from a shell."""
     command = [sys.executable, "-m", "slamreplay.cli.main", *map(str, arguments)]
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
-    return subprocess.Popen(command, start_new_session=True, **{**pipes, **how})
+    env = os.environ | {"PYTHONFAULTHANDLER": "1"}
+    return subprocess.Popen(command, start_new_session=True, env=env, **{**pipes, **how})
 
 
-def finished(program, timeout=300):
-    """Exit code, stdout and stderr."""
-    out, err = program.communicate(timeout=timeout)
+def finished(program, timeout=180):
+    """Exit code, stdout and stderr; one that does not end tells what it is at."""
+    try:
+        out, err = program.communicate(timeout=timeout)
+    except subprocess.TimeoutExpired:
+        program.send_signal(signal.SIGABRT)
+        _, err = program.communicate()
+        raise AssertionError(f"it did not end within {timeout} s:\n{err[-6000:]}") from None
     return program.returncode, out, err
 
 
