@@ -268,9 +268,12 @@ def test_who_was_lost_beside_an_area_counts_from_its_first_sighting_on(tmp_path)
     logs.append(log_row("1z", start_ns=DAY0 + 2 * HOUR, state="lost"))
     logs.append(log_row("sim", start_ns=3 * 10**9, state="lost"))
     places += [place_row(key, 1, 0, lost_s=64.0) for key in ("1z", "sim")]
+    # Lost for a moment: no lost log, but time lost all the same.
+    logs.append(log_row("7", start_ns=DAY0 + 7 * HOUR))
+    places.append(place_row("7", 1, 0, lost_s=0.5))
     commit(tmp_path, tables(logs=logs, places=places))
     (area,) = answers(tmp_path).areas
-    assert (area.lost_near, area.lost_near_s) == (4, 4.0 + 8.0 + 16.0 + 32.0)
+    assert (area.lost_near, area.lost_near_s) == (4, 4.0 + 8.0 + 16.0 + 32.0 + 0.5)
 
 
 def test_one_robot_that_contradicts_what_others_find_is_not_believed(tmp_path):

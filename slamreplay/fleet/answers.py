@@ -205,7 +205,7 @@ class Area:
             confirm the map again.
         near_h: time of all robots within `NEAR_M` of it, h.
         lost_near_s: time lost there since it was first contradicted, that log included.
-        lost_near: logs in which the robot was lost there since then.
+        lost_near: logs with the verdict lost in which the robot was so there since then.
         in_use: whether its map still was at the end of what is known of the site.
         advice: re-map: it stays that way, by more than one robot or log; temporary: the map was
             found right again; watch: neither is known yet.

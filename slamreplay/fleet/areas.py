@@ -166,7 +166,7 @@ def _area(
     since: Flags,
 ) -> Area:
     low, high = cells.min(axis=0), cells.max(axis=0) + 1
-    near_s, lost_s, lost_near = _beside(found, map_index, low, high, since)
+    near_s, lost_s, by = _beside(found, map_index, low, high, since)
     against = course.log[course.against]
     turned = np.flatnonzero(course.against != course.against[-1])
     run = len(course.against) - 1 - (int(turned[-1]) if len(turned) else -1)
@@ -198,7 +198,8 @@ def _area(
         latest=latest,
         near_h=near_s / _S_PER_H,
         lost_near_s=lost_s,
-        lost_near=lost_near,
+        # Of the lost logs, as the page has it: one that was lost for a moment is none.
+        lost_near=int(np.count_nonzero(logs.outcome("lost")[1][by])),
         in_use=in_use.of(site, version),
         advice=advice,
         why=why,
@@ -208,8 +209,8 @@ def _area(
 
 def _beside(
     found: Gathered, map_index: int, low: Ints, high: Ints, since: Flags
-) -> tuple[float, float, int]:
-    """Time of all robots within `NEAR_M` of a box, s; of logs `since` that lost, and how many.
+) -> tuple[float, float, Ints]:
+    """Time of all robots within `NEAR_M` of a box, s; of logs `since` that lost, and which.
 
     Who was lost there before the map was wrong was not lost because of it.
     """
@@ -225,7 +226,7 @@ def _beside(
     lost = of_map(found.lost.place, map_index)
     who, lost_s = found.lost.by[lost], found.lost.by_s[lost]
     counts = near(found.lost.place[lost]) & since[who]
-    return float(here_s.sum()), float(lost_s[counts].sum()), len(np.unique(who[counts]))
+    return float(here_s.sum()), float(lost_s[counts].sum()), np.unique(who[counts])
 
 
 _ADVICES: tuple[Advice, ...] = ("re-map", "watch", "temporary")

@@ -91,9 +91,9 @@ with recursive looks as (
   group by area
 ), lost as (
   -- Who was lost there before the map was wrong was not lost because of it.
-  select area, sum(l.lost_s) as lost_near_s, count(distinct key) as lost_near
+  select area, sum(l.lost_s) as lost_near_s, count(distinct key) filter (is_lost) as lost_near
   from boxes join told using (area) join (
-    select site, places.map_version, col, "row", key, start_ns, places.lost_s
+    select site, places.map_version, col, "row", key, start_ns, is_lost, places.lost_s
     from places join counted using (key) where places.lost_s > 0 and ordered
   ) as l
     on boxes.site is not distinct from l.site and boxes.map_version = l.map_version
