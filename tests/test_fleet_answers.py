@@ -258,6 +258,24 @@ def test_advice_follows_what_later_logs_saw(tmp_path, course, robots, advice, pe
     assert area.first_day == date(2026, 1, 1 + course.index("x"))
 
 
+def test_who_was_lost_beside_an_area_counts_from_its_first_sighting_on(tmp_path):
+    logs, places = [], []
+    for k in range(6):
+        logs.append(log_row(f"{k}", start_ns=DAY0 + k * HOUR, robot=f"r{k % 2}", state="lost"))
+        places.append(place_row(f"{k}", 0, 0, contradicted_m2=0.3 if k >= 2 else 0.0))
+        places.append(place_row(f"{k}", 1, 0, here_s=16.0, lost_s=2.0**k))
+    # Of two that start at once the key decides, and of a clock without a day nobody knows.
+    logs.append(log_row("1z", start_ns=DAY0 + 2 * HOUR, state="lost"))
+    logs.append(log_row("sim", start_ns=3 * 10**9, state="lost"))
+    places += [place_row(key, 1, 0, lost_s=64.0) for key in ("1z", "sim")]
+    # Lost for a moment: no lost log, but time lost all the same.
+    logs.append(log_row("7", start_ns=DAY0 + 7 * HOUR))
+    places.append(place_row("7", 1, 0, lost_s=0.5))
+    commit(tmp_path, tables(logs=logs, places=places))
+    (area,) = answers(tmp_path).areas
+    assert (area.lost_near, area.lost_near_s) == (4, 4.0 + 8.0 + 16.0 + 32.0 + 0.5)
+
+
 def test_one_robot_that_contradicts_what_others_find_is_not_believed(tmp_path):
     logs, places = [], []
     for k in range(8):
@@ -323,7 +341,7 @@ def test_logs_whose_clock_tells_no_day_do_not_make_a_change_old(tmp_path):
     places = [place_row(row["key"], 0, 0, contradicted_m2=0.3) for row in logs]
     commit(tmp_path, tables(logs=logs, places=places))
     (area,) = answers(tmp_path).areas
-    assert (area.first_ns, area.logs) == (DAY0, 4)
+    assert (area.first_day, area.logs) == (date(2026, 1, 1), 4)
     assert any("tell no day" in remark for remark in answers(tmp_path).remarks)
 
 

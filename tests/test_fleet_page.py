@@ -14,10 +14,10 @@ from fleet_tables import AGED_AISLE, AISLE_M, BOX_ROWS, FIRST_DAY, NEW_SOFTWARE,
 from hypothesis import given
 from hypothesis import strategies as st
 
-from slamreplay.batch import folder as batch_folder
 from slamreplay.fleet.answering import answers as answers_of
 from slamreplay.fleet.answers import Copies, Failure, Share
-from slamreplay.fleet.page import headline, lines, remap, words, writer
+from slamreplay.fleet.layout import map_folder
+from slamreplay.fleet.page import headline, lines, remap, words
 from slamreplay.fleet.page.bars import columns, pieces
 from slamreplay.fleet.page.frame import around, frame_of, nice, ticks
 from slamreplay.fleet.page.heat import blocks_of, heat
@@ -338,7 +338,7 @@ def test_a_folder_without_logs_has_a_page(tmp_path):
 
 def test_a_map_that_cannot_be_read_is_told_and_left_out(folder, answers, tmp_path):
     version = answers.maps[0].map_version
-    place = tmp_path / writer.map_folder(version)
+    place = tmp_path / map_folder(version)
     place.mkdir(parents=True)
     (place / "map.yaml").write_text("image: gone.pgm\nresolution: 0.1\norigin: [0, 0, 0]\n")
     told = []
@@ -349,12 +349,6 @@ def test_a_map_that_cannot_be_read_is_told_and_left_out(folder, answers, tmp_pat
     assert "gone.pgm" in told[0]
     assert not page.all("image")
     assert any("The map itself is not in the folder." in text for text in page.texts("p"))
-
-
-def test_maps_are_looked_for_where_a_batch_puts_them():
-    version = f"sha256:{'ab' * 32}"
-
-    assert writer.map_folder(version) == batch_folder.map_folder(version)
 
 
 def test_the_terminal_is_told_the_same(answers):

@@ -1,6 +1,8 @@
 """Annotations and step summary, read as GitHub's runner and a Markdown parser read them."""
 
+import json
 import re
+from dataclasses import replace
 from html.parser import HTMLParser
 
 import gated
@@ -11,6 +13,7 @@ from hypothesis import strategies as st
 from markdown_it import MarkdownIt
 
 from slamreplay.gate.github import annotations, artifacts_of, commands_stopped, step_summary
+from slamreplay.gate.sarif import sarif_text
 from slamreplay.gate.step_summary import MOST_BYTES
 
 
@@ -188,3 +191,21 @@ def test_logs_that_are_well_are_folded():
 
     assert "\n### Logs\n\n<details><summary>25 logs</summary>" in step_summary(made)
     assert step_summary(made).startswith("## Gate: passed\n")
+
+
+def test_all_logs_together_are_none_of_the_logs():
+    check = "baseline/error_mean_m"
+    logs = [gated.log(name, gated.outcome(check)) for name in ("a.mcap", "b.mcap")]
+    whole = gated.log("baseline.json", gated.outcome(check), state=None, start_ns=None)
+    found = gated.result(*logs, whole)
+    assert "(2 logs of 2)" in annotations(found)
+    shown = step_summary(found)
+    assert "Of 2 logs: 2 failed." in shown
+    assert "| 2 of 2 |" in shown
+    assert "| all together |" in step_summary(gated.result(gated.log("a.mcap"), whole))
+    skipped = gated.outcome("baseline/logs", "skipped", "1 not judged now")
+    left = replace(whole, outcomes=(skipped,))
+    (run,) = json.loads(sarif_text(gated.result(*logs, left)))["runs"]
+    assert run["properties"]["logs"] == {"failed": 2}
+    notes = [n["message"]["text"] for n in run["invocations"][0]["toolExecutionNotifications"]]
+    assert notes == ["Not assessable: 1 not judged now"]

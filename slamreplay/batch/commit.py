@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from slamreplay.batch.folder import map_folder
 from slamreplay.batch.task import LogResult
 from slamreplay.bundle.atomic import atomic_folder
+from slamreplay.fleet.layout import map_folder
 from slamreplay.fleet.store import commit, read
 from slamreplay.report import REPORT_FILE
 

@@ -13,11 +13,11 @@ from slamreplay.batch.lock import held_lock
 from slamreplay.batch.task import LogTask
 from slamreplay.bundle.atomic import check_target, write_file
 from slamreplay.errors import OutputError
+from slamreplay.fleet.layout import MAPS, PAGE_FILE, QUERIES_FILE
 
 #: Marks a folder as ours.
 MARKER = "batch.json"
-REPORTS, MAPS, SCRATCH, LOCK = "logs", "maps", ".scratch", ".lock"
-PAGES = ("fleet.html", "queries.sql")
+REPORTS, SCRATCH, LOCK = "logs", ".scratch", ".lock"
 VERSION = 1
 
 _NAME_LENGTH = 60
@@ -56,7 +56,7 @@ def _clear(target: Path) -> None:
     for folder in (target / REPORTS, target / MAPS):
         for left in folder.glob(".*"):  # as of `atomic_folder`; names of ours begin with no dot
             shutil.rmtree(left, ignore_errors=True)
-    for name in (MARKER, *PAGES):
+    for name in (MARKER, PAGE_FILE, QUERIES_FILE):
         for file in target.glob(f".{name}.*"):  # as of `write_file`
             file.unlink(missing_ok=True)
 
@@ -66,11 +66,6 @@ def report_folder(task: LogTask) -> str:
     name = re.split(r"[/\\]", task.source.log.rstrip("/\\"))[-1]
     plain = re.sub(r"[^A-Za-z0-9._-]+", "_", name).strip("._")[:_NAME_LENGTH] or "log"
     return f"{REPORTS}/{plain}-{task.key[:12]}"
-
-
-def map_folder(version: str) -> str:
-    """Where a map goes, from the batch's folder."""
-    return f"{MAPS}/{version.removeprefix('sha256:')[:16]}"
 
 
 def _settle_marker(marker: Path) -> None:

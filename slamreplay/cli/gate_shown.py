@@ -38,9 +38,7 @@ def show_result(result: GateResult) -> None:
     _show_failures(result)
     tone: Tone = "bad" if result.exit_code else "good"
     words = {0: "The gate passes", 1: "The gate fails", 2: "A log could not be read"}
-    # What stands for all logs together, under the baseline's path, is none of them.
-    counts = Counter(log.status for log in result.logs
-                     if log.state is not None or log.status == "error")  # fmt: skip
+    counts = Counter(log.status for log in result.single)
     told = ", ".join(f"{counts[s]} {_WORDS[s].lower()}" for s in _WORDS if counts[s])
     say()
     say((words[result.exit_code], tone), f": {told} ({result.recipe})")

@@ -199,15 +199,13 @@ class Area:
         robots: distinct ones that contradict it.
         first_day: when the first one did; None where no clock tells.
         last_day: when the last one did.
-        first_ns: start of that first log.
-        last_ns: start of that last log.
         visits: logs that looked there since it was first contradicted, without the first.
         still: of them, those that contradict it.
         latest: how many of the latest looks, one after the other, contradict it; negative: how many
             confirm the map again.
         near_h: time of all robots within `NEAR_M` of it, h.
-        lost_near_s: time lost there.
-        lost_near: logs in which the robot was lost there.
+        lost_near_s: time lost there since it was first contradicted, that log included.
+        lost_near: logs with the verdict lost in which the robot was so there since then.
         in_use: whether its map still was at the end of what is known of the site.
         advice: re-map: it stays that way, by more than one robot or log; temporary: the map was
             found right again; watch: neither is known yet.
@@ -224,8 +222,6 @@ class Area:
     robots: int
     first_day: date | None
     last_day: date | None
-    first_ns: int
-    last_ns: int
     visits: int
     still: int
     latest: int

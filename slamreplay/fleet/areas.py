@@ -17,7 +17,7 @@ from slamreplay.fleet.cells import AGAINST_M2, Ints, Maps, Rows, of_map, split, 
 from slamreplay.fleet.changed_regions import Kinds
 from slamreplay.fleet.counted import Counted, Flags
 from slamreplay.fleet.course import RECENT, Course, advice_on, course_of
-from slamreplay.fleet.gathered import AGAINST, HERE, LOST, Gathered, looks
+from slamreplay.fleet.gathered import AGAINST, HERE, Gathered, looks
 from slamreplay.fleet.in_use import InUse
 from slamreplay.fleet.schema import PLACE_M
 from slamreplay.geometry import se2
@@ -124,7 +124,8 @@ def areas(
         if course is None:
             continue
         map_index, cells = int(where[places[0], 0]), where[places, 1:]
-        answers.append(_area(logs, found, course, map_index, cells, kinds, in_use))
+        since = logs.ordered & (rank >= rank[course.log[0]])
+        answers.append(_area(logs, found, course, map_index, cells, kinds, in_use, since))
     return tuple(sorted(answers, key=_order))
 
 
@@ -162,9 +163,10 @@ def _area(
     cells: Ints,
     kinds: Kinds,
     in_use: InUse,
+    since: Flags,
 ) -> Area:
     low, high = cells.min(axis=0), cells.max(axis=0) + 1
-    near_s, lost_s, lost_near = _beside(found, map_index, low, high)
+    near_s, lost_s, by = _beside(found, map_index, low, high, since)
     against = course.log[course.against]
     turned = np.flatnonzero(course.against != course.against[-1])
     run = len(course.against) - 1 - (int(turned[-1]) if len(turned) else -1)
@@ -180,7 +182,6 @@ def _area(
         float(recent.mean()),
     )
     days = [day for day in logs.day[against].tolist() if day is not None]
-    start_ns = logs.start_ns[against]
     x_min, y_min, x_max, y_max = (PLACE_M * float(edge) for edge in (*low, *high))
     return Area(
         site=site,
@@ -192,14 +193,13 @@ def _area(
         robots=robots,
         first_day=min(days, default=None),
         last_day=max(days, default=None),
-        first_ns=int(start_ns[0]),
-        last_ns=int(start_ns[-1]),
         visits=len(course.log) - 1,
         still=len(against) - 1,
         latest=latest,
         near_h=near_s / _S_PER_H,
         lost_near_s=lost_s,
-        lost_near=lost_near,
+        # Of the lost logs, as the page has it: one that was lost for a moment is none.
+        lost_near=int(np.count_nonzero(logs.outcome("lost")[1][by])),
         in_use=in_use.of(site, version),
         advice=advice,
         why=why,
@@ -207,8 +207,13 @@ def _area(
     )
 
 
-def _beside(found: Gathered, map_index: int, low: Ints, high: Ints) -> tuple[float, float, int]:
-    """Time of all robots within `NEAR_M` of a box, of it lost, s, and the logs that were lost."""
+def _beside(
+    found: Gathered, map_index: int, low: Ints, high: Ints, since: Flags
+) -> tuple[float, float, Ints]:
+    """Time of all robots within `NEAR_M` of a box, s; of logs `since` that lost, and which.
+
+    Who was lost there before the map was wrong was not lost because of it.
+    """
     reach = round(NEAR_M / PLACE_M)
 
     def near(code: Ints) -> Flags:
@@ -217,10 +222,11 @@ def _beside(found: Gathered, map_index: int, low: Ints, high: Ints) -> tuple[flo
         return across & (row >= low[1] - reach) & (row < high[1] + reach)
 
     rows = of_map(found.places.code, map_index)
-    added = found.places.added[rows][near(found.places.code[rows])]
+    here_s = found.places.added[rows, HERE][near(found.places.code[rows])]
     lost = of_map(found.lost.place, map_index)
-    who = found.lost.by[lost][near(found.lost.place[lost])]
-    return float(added[:, HERE].sum()), float(added[:, LOST].sum()), len(np.unique(who))
+    who, lost_s = found.lost.by[lost], found.lost.by_s[lost]
+    counts = near(found.lost.place[lost]) & since[who]
+    return float(here_s.sum()), float(lost_s[counts].sum()), np.unique(who[counts])
 
 
 _ADVICES: tuple[Advice, ...] = ("re-map", "watch", "temporary")

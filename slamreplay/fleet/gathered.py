@@ -44,6 +44,7 @@ class Lost:
         entered: (N,) how often it became lost there.
         place: (M,) places at which a log was lost, ascending.
         by: (M,) which log.
+        by_s: (M,) for how long.
     """
 
     log: Ints
@@ -52,6 +53,7 @@ class Lost:
     entered: se2.Array
     place: Ints
     by: Ints
+    by_s: se2.Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,24 +80,26 @@ def gathered(now: Snapshot, logs: Counted) -> Gathered:
     maps = Maps(logs)
     places, spots = Adding(7), Adding(5)
     lost: list[tuple[Ints, Ints, se2.Array, se2.Array]] = []
-    at: list[tuple[Ints, Ints]] = []
+    at: list[tuple[Ints, Ints, se2.Array]] = []
     for rows in maps.rows(now, (*_TIMES, *_SEEN)):
         places.add(*_of_places(rows, logs))
         lost.append(_of_spots(rows, spots))
         was = rows.numbers["lost_s"] > 0
-        at.append((rows.code[was], rows.log[was]))
+        at.append((rows.code[was], rows.log[was], rows.numbers["lost_s"][was]))
     none = np.empty(0, dtype=np.int64)
     empty = (none, none, np.empty(0), np.empty(0))
     log, spot, lost_s, entered = (
         np.concatenate([part[k] for part in (empty, *lost)]) for k in range(4)
     )
-    place, by = (np.concatenate([part[k] for part in ((none, none), *at)]) for k in range(2))
+    place, by, by_s = (
+        np.concatenate([part[k] for part in ((none, none, np.empty(0)), *at)]) for k in range(3)
+    )
     order = np.lexsort((by, place))
     return Gathered(
         tuple(maps.names),
         places.sums(),
         spots.sums(),
-        Lost(log, spot, lost_s, entered, place[order], by[order]),
+        Lost(log, spot, lost_s, entered, place[order], by[order], by_s[order]),
         maps.left_out,
     )
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import posixpath
 from collections import Counter
+from collections.abc import Iterable
 from dataclasses import dataclass
 from hashlib import sha256
 
@@ -17,6 +18,11 @@ _WORST = {"error": 0, "warning": 1, "info": 2}
 def told(outcome: Outcome) -> str:
     """What it demands and what was found, for a place that does not show the former."""
     return ": ".join(text for text in (outcome.title, outcome.message) if text) or outcome.check
+
+
+def logs_of(failures: Iterable[Failure]) -> int:
+    """How many logs they are on: what stands for all logs together is none."""
+    return len({failure.log.log for failure in failures if not failure.log.is_of_all})
 
 
 @dataclass(frozen=True)

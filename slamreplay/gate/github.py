@@ -12,7 +12,7 @@ from secrets import token_hex
 
 from slamreplay.bundle.findings import Severity
 from slamreplay.evidence.clean import clean, one_line, straight
-from slamreplay.gate.failures import Failure, failures, relative
+from slamreplay.gate.failures import Failure, failures, logs_of, relative
 from slamreplay.gate.outcome import GateResult
 from slamreplay.gate.step_summary import step_summary
 
@@ -46,9 +46,9 @@ def annotations(result: GateResult) -> str:
         lines += [_line(command, group, result) for group in of_kind[:most]]
         left_out += of_kind[most:]
     if left_out:
-        logs = {failure.log.log for group in left_out for failure in group}
+        logs = logs_of(failure for group in left_out for failure in group)
         told = (
-            f"{len(left_out)} more failures of a check, on {_logs(len(logs))}, are not annotated: "
+            f"{len(left_out)} more failures of a check, on {_logs(logs)}, are not annotated: "
             f"GitHub takes {PER_KIND} of a kind from a step. junit.xml has them all."
         )
         lines.append(_command("notice", {"title": "slamreplay gate"}, told))
@@ -99,11 +99,10 @@ def _groups(found: list[Failure]) -> list[list[Failure]]:
 
 def _line(command: str, group: list[Failure], result: GateResult) -> str:
     first = group[0]
-    logs = {failure.log.log for failure in group}
-    alone = len(logs) == 1
+    alone = len({failure.log.log for failure in group}) == 1
     title = one_line(f"{first.outcome.check}: {first.outcome.title}", _TITLE_LETTERS)
     if not alone:
-        title += f" ({_logs(len(logs))} of {len(result.logs)})"
+        title += f" ({_logs(logs_of(group))} of {len(result.single)})"
     file = first.log.log if alone else result.recipe
     properties = {"file": straight(clean(relative(file))), "title": title}
     return _command(command, properties, "\n".join(_quoted(group, alone)))

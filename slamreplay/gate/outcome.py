@@ -74,6 +74,11 @@ class GatedLog:
                 return status
         return "passed" if "passed" in found else "skipped"
 
+    @property
+    def is_of_all(self) -> bool:
+        """Whether it stands for all logs together, and is none itself."""
+        return self.state is None and self.status != "error"
+
 
 @dataclass(frozen=True)
 class GateResult:
@@ -88,6 +93,11 @@ class GateResult:
     question: str
     recipe: str
     logs: tuple[GatedLog, ...]
+
+    @property
+    def single(self) -> tuple[GatedLog, ...]:
+        """The logs, without what stands for all of them together."""
+        return tuple(log for log in self.logs if not log.is_of_all)
 
     @property
     def exit_code(self) -> int:

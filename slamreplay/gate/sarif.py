@@ -100,7 +100,7 @@ def _text(result: GateResult, found: Sequence[Failure], kept: Sequence[Failure])
         "results": [_result(failure, result, places) for failure in kept],
         "properties": {
             "question": one_line(result.question, _LETTERS),
-            "logs": dict(Counter(log.status for log in result.logs)),
+            "logs": dict(Counter(log.status for log in result.single)),
             "cut": cut,
         },
     }
@@ -183,12 +183,15 @@ def _notifications(
         )
         notes.append(_notification("cut", "warning", left_out))
     skipped: dict[str, list[Outcome]] = {}
+    single = Counter[str]()
     for log in result.logs:
         for outcome in log.outcomes:
             if outcome.status == "skipped":
                 skipped.setdefault(_id(outcome.check), []).append(outcome)
+                single[_id(outcome.check)] += not log.is_of_all
     for check, outcomes in list(skipped.items())[:MOST_NOTIFICATIONS]:
-        why = f"Not assessable in {len(outcomes)} of {len(result.logs)} logs: {outcomes[0].message}"
+        where = f" in {single[check]} of {len(result.single)} logs" if single[check] else ""
+        why = f"Not assessable{where}: {outcomes[0].message}"
         of_check = _notification("not-assessable", "note", why)
         if check in places:
             of_check["associatedRule"] = {"id": check, "index": places[check]}

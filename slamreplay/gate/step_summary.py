@@ -7,7 +7,7 @@ from urllib.parse import quote
 
 from slamreplay.evidence.clean import as_markdown, clean, one_line
 from slamreplay.evidence.words import STATES
-from slamreplay.gate.failures import Failure, failures, told
+from slamreplay.gate.failures import Failure, failures, logs_of, told
 from slamreplay.gate.outcome import STATUSES, GatedLog, GateResult, Status
 
 #: GitHub refuses a summary of more than 1 MiB (all that one step wrote to it), and shows nothing.
@@ -63,12 +63,12 @@ def step_summary(result: GateResult, *, artifacts: str | None = None) -> str:
 
 
 def _head(result: GateResult) -> str:
-    counted = {status: sum(log.status == status for log in result.logs) for status in STATUSES}
+    counted = {status: sum(log.status == status for log in result.single) for status in STATUSES}
     how_many = ", ".join(
         f"{counted[status]} {_WORDS[status]}" for status in STATUSES if counted[status]
     )
     ended = {0: "passed", 1: "failed"}.get(result.exit_code, "could not read every log")
-    total = len(result.logs)
+    total = len(result.single)
     logs = "1 log" if total == 1 else f"{total} logs"
     return (
         f"## Gate: {ended}\n\n{_cell(result.question)}\n\n"
@@ -84,7 +84,7 @@ def _by_check(found: Sequence[Failure], result: GateResult) -> list[tuple[str, .
         (
             f"{_cell(check)}<br>{_cell(group[0].outcome.title)}",
             severity,
-            f"{len({failure.log.log for failure in group})} of {len(result.logs)}",
+            f"{logs_of(group)} of {len(result.single)}" if logs_of(group) else "all together",
             _quoted((failure.outcome.message for failure in group), len(group), 1),
         )
         for (check, severity), group in groups.items()

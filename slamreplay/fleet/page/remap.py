@@ -85,7 +85,7 @@ def cards(
 def rest(areas: Sequence[Area], reports: Reports) -> Table:
     """Areas as rows: those that had no room, that may still settle, or that did."""
     head = ("advice", "site", "where", "area", "since", "logs, robots", "later looks",
-            "lost nearby", "latest log")  # fmt: skip
+            "lost nearby since", "latest log")  # fmt: skip
     rows = [
         (
             area.advice,
@@ -120,7 +120,7 @@ def _card(
         ("since", f"{words.day(area.first_day)}, last seen {words.day(area.last_day)}"),
         ("seen by", f"{words.count(area.logs, 'log')} of {words.count(area.robots, 'robot')}"),
         ("still so", _still(area)),
-        ("it costs", f"{lost} lost nearby, of {words.hours(area.near_h)} that robots were there"),
+        ("it costs", f"{lost} lost nearby since; {words.hours(area.near_h)} driven there in all"),
         ("map", words.map_name(area.map_version)),
     )  # fmt: skip
     return Card(
@@ -128,7 +128,7 @@ def _card(
         square_metres(area.m2),
         words.day(area.first_day),
         f"{words.count(area.logs, 'log')} of {words.count(area.robots, 'robot')}, {_still(area)}; "
-        f"{lost} lost nearby",
+        f"{lost} lost nearby since",
         facts,
         area.why,
         reports.of(area.example),

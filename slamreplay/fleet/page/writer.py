@@ -9,13 +9,12 @@ from slamreplay.bundle.atomic import write_file
 from slamreplay.errors import MapError
 from slamreplay.fleet.answering import answers as answers_of
 from slamreplay.fleet.answers import Answers
+from slamreplay.fleet.layout import PAGE_FILE, QUERIES_FILE, map_folder
 from slamreplay.fleet.page.html import fleet_html
 from slamreplay.fleet.page.map_image import MapImage, map_image
 from slamreplay.fleet.page.view import versions_drawn, view_of
 from slamreplay.fleet.queries import queries_sql
 from slamreplay.maps.map_server import read_map
-
-PAGE_FILE, QUERIES_FILE = "fleet.html", "queries.sql"
 
 
 def write_fleet_page(
@@ -41,11 +40,6 @@ def write_fleet_page(
     target = folder / PAGE_FILE
     write_file(target, fleet_html(view_of(answers, images)).encode())
     return target
-
-
-def map_folder(version: str) -> str:
-    """Where a map is, from the batch's folder."""
-    return f"maps/{version.removeprefix('sha256:')[:16]}"
 
 
 def _images(

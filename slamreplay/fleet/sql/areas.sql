@@ -76,25 +76,29 @@ with recursive looks as (
       max(n) filter (n >= first_n and against <> last_against), min(first_n) - 1
     ) as run,
     avg(against::int) filter (n >= first_n and back <= $RECENT) as recent,
+    first(key order by n) filter (against) as first_key,
+    first(start_ns order by n) filter (against) as first_ns,
     last(key order by n) filter (against) as example
   from course group by area having bool_or(against)
 ), sums as (
-  select site, places.map_version, col, "row", sum(here_s) as here_s, sum(places.lost_s) as lost_s
+  select site, places.map_version, col, "row", sum(here_s) as here_s
   from places join counted using (key) group by all
 ), beside as (
-  select area, sum(here_s) / 3600 as near_h, sum(lost_s) as lost_near_s
+  select area, sum(here_s) / 3600 as near_h
   from boxes join sums
     on boxes.site is not distinct from sums.site and boxes.map_version = sums.map_version
     and col between x0 - $NEAR and x1 + $NEAR and "row" between y0 - $NEAR and y1 + $NEAR
   group by area
 ), lost as (
-  select area, count(distinct key) as lost_near
-  from boxes join (
-    select site, places.map_version, col, "row", key
-    from places join counted using (key) where places.lost_s > 0
+  -- Who was lost there before the map was wrong was not lost because of it.
+  select area, sum(l.lost_s) as lost_near_s, count(distinct key) filter (is_lost) as lost_near
+  from boxes join told using (area) join (
+    select site, places.map_version, col, "row", key, start_ns, is_lost, places.lost_s
+    from places join counted using (key) where places.lost_s > 0 and ordered
   ) as l
     on boxes.site is not distinct from l.site and boxes.map_version = l.map_version
     and col between x0 - $NEAR and x1 + $NEAR and "row" between y0 - $NEAR and y1 + $NEAR
+    and (start_ns > first_ns or start_ns = first_ns and key >= first_key)
   group by area
 ), kinds as (
   select area, kind, count(*) as n
