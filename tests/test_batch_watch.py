@@ -174,7 +174,7 @@ def test_it_must_stand_still_for_long_enough(bench):
     assert bench.tally.moving == 1
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=25, deadline=None)
 @given(
     cuts=st.lists(st.integers(1, len(mcap()) - 1), max_size=6, unique=True),
     waits=st.lists(st.integers(0, 6), min_size=7, max_size=7),
