@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from documents import Document
 from fleet_tables import AGED_AISLE, AISLE_M, BOX_ROWS, FIRST_DAY, NEW_SOFTWARE, fleet
+from fleets import log_row, tables
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -27,6 +28,7 @@ from slamreplay.fleet.page.site_maps import MOST_MAPS
 from slamreplay.fleet.page.view import view_of
 from slamreplay.fleet.page.writer import write_fleet_page
 from slamreplay.fleet.queries import queries, views
+from slamreplay.fleet.store import commit
 from slamreplay.maps.grid import OccupancyGrid
 
 EVIL = '"><script>alert(1)</script><img src=x onerror=alert(2)>\u202egnp.\u2066 {{ 7*191 }} '
@@ -326,6 +328,25 @@ def test_a_large_fleet_is_cut_and_says_so(answers):
     assert f"{30 - MOST_MAPS} more maps" in said
     assert " more in the query's answer." in said
     assert "323 older days not shown." in " ".join(page.texts("figcaption"))
+
+
+def test_a_fleet_that_could_not_be_judged_is_not_told_to_be_well(tmp_path):
+    rows = [log_row(key, state="unobservable") for key in ("a", "b")]
+    commit(tmp_path, tables(logs=rows))
+    found = answers_of(tmp_path)
+    said = headline.sentence(found)
+
+    assert said == "None of 2 logs of 1 robot in 1 day was lost (2 could not be judged)."
+    assert headline.tone(found) == "insufficient_data"
+    assert headline.facts(found)[0].number == "unknown"
+    assert not any("No aisle" in line for line in lines.fleet_lines(found))
+
+
+def test_a_worse_version_is_told_with_how_often_chance_looks_like_it(answers):
+    told = headline.facts(answers)[2]
+
+    assert told.alarming
+    assert "one in forty looks worse by chance" in told.detail
 
 
 def test_a_folder_without_logs_has_a_page(tmp_path):

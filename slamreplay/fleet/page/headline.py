@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from slamreplay.fleet.answers import Answers, Area, Step
+from slamreplay.fleet.answers import LEAST_LOGS, Answers, Area, Step
 from slamreplay.fleet.page import words
 from slamreplay.fleet.page.remap import needed
 from slamreplay.verdict.words import square_metres
@@ -43,7 +43,8 @@ def sentence(answers: Answers) -> str:
     unjudged = total.logs - total.lost.n
     # Who reads "none was lost" of logs that say nothing is misled.
     blind = f" ({unjudged:,} could not be judged)" if 2 * unjudged > total.logs else ""
-    return f"{begin}{blind}{_explained(answers)}."
+    explained = _explained(answers) if total.lost.n else ""  # what nobody judged tells of no map
+    return f"{begin}{blind}{explained}."
 
 
 def tone(answers: Answers) -> str:
@@ -52,12 +53,12 @@ def tone(answers: Answers) -> str:
         return "lost"
     if needed(answers.areas):
         return "map_changed"
-    return "healthy" if answers.total.logs > answers.total.failed else "insufficient_data"
+    return "healthy" if answers.total.lost.n else "insufficient_data"
 
 
 def facts(answers: Answers) -> tuple[Fact, Fact, Fact]:
     """Which aisles need re-mapping, how often robots get lost, and whether software got worse."""
-    return _areas(answers.areas), _rate(answers), _software(answers.steps)
+    return _areas(answers), _rate(answers), _software(answers.steps)
 
 
 def _explained(answers: Answers) -> str:
@@ -108,8 +109,11 @@ def _site(area: Area) -> str:
     return area.site if area.site.lower().startswith("site") else f"site {area.site}"
 
 
-def _areas(areas: Sequence[Area]) -> Fact:
-    found = needed(areas)
+def _areas(answers: Answers) -> Fact:
+    areas, found = answers.areas, needed(answers.areas)
+    if not answers.total.lost.n:
+        detail = "Which aisles need re-mapping: no log could be judged."
+        return Fact("unknown", "", detail, "#remap", "See it")
     if not found:
         watched = sum(area.advice == "watch" for area in areas)
         detail = "No part of a map stays contradicted by logs."
@@ -164,11 +168,17 @@ def _software(steps: Sequence[Step]) -> Fact:
         f"of logs {measure_words(step.measure)} with {step.after}; {words.share_of(step.was)} with "
         f"{step.before}",
         f"The difference is {difference(step)}, over {words.count(step.sites, 'site')} and "
-        f"{words.count(step.robots, 'robot')}.",
+        f"{words.count(step.robots, 'robot')}. {_by_chance(steps)}",
         "#software",
         "See the numbers",
         alarming=True,
     )
+
+
+def _by_chance(steps: Sequence[Step]) -> str:
+    """Many differences are looked at, and the one that is told was chosen for being worse."""
+    told = sum(min(step.was.n, step.now.n) >= LEAST_LOGS for step in steps)
+    return f"Of {told:,} differences compared, one in forty looks worse by chance."
 
 
 def newest(steps: Sequence[Step]) -> Step:

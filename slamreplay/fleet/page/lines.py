@@ -12,7 +12,7 @@ _MOST_AREAS = 2
 
 
 def fleet_lines(answers: Answers) -> list[str]:
-    """Three to six lines: the sentence, how often, which aisles, which software, what failed."""
+    """Up to six lines: the sentence, how often, which aisles, which software, what failed."""
     total, areas = answers.total, needed(answers.areas)
     lines = [headline.sentence(answers)]
     rate = total.lost_per_km
@@ -29,8 +29,10 @@ def fleet_lines(answers: Answers) -> list[str]:
         for a in areas[:_MOST_AREAS]
     )
     more = f"; and {len(areas) - _MOST_AREAS:,} more" if len(areas) > _MOST_AREAS else ""
-    lines.append(f"Aisles that need re-mapping: {told}{more}." if told else
-                 "No aisle needs re-mapping.")  # fmt: skip
+    if told:
+        lines.append(f"Aisles that need re-mapping: {told}{more}.")
+    elif total.lost.n:
+        lines.append("No aisle needs re-mapping.")
     worse = [step for step in answers.steps if step.verdict == "worse"]
     if worse:
         step = headline.newest(worse)
