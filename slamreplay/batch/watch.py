@@ -3,6 +3,8 @@
 It looks at intervals and depends on no notices of a file system, which a share or an object store
 does not send. Nothing is kept in memory alone: what is done stands in the batch's folder, so that a
 watch that was killed goes on, as a batch does, with what is missing.
+
+It is long because a round is one story, with what is waited for, put off and told once.
 """
 
 from __future__ import annotations

@@ -4,6 +4,8 @@ The same questions stand as SQL in `queries.sql` of the folder (`queries`), and 
 numbers there. A log under two names (one `content`) is counted once, and told in `copies`. Texts
 may come from logs: they are to be escaped where they are shown. None of a label means that nobody
 told it; None of a number that it is not known.
+
+Types only, and long, for whoever draws or checks a page reads them all in one place.
 """
 
 from __future__ import annotations
