@@ -25,7 +25,6 @@ from slamreplay.gate.baseline import (
     previous_failures,
 )
 from slamreplay.gate.gated import gated, runs_of, unread
-from slamreplay.gate.github import step_summary
 from slamreplay.gate.gitlab import code_quality_json
 from slamreplay.gate.junit import junit_xml
 from slamreplay.gate.measures import Measures
@@ -33,6 +32,7 @@ from slamreplay.gate.measuring import measures_of
 from slamreplay.gate.outcome import GatedLog, GateResult
 from slamreplay.gate.result_file import gate_json
 from slamreplay.gate.sarif import sarif_text
+from slamreplay.gate.step_summary import step_summary
 from slamreplay.postmortem import postmortem
 
 if TYPE_CHECKING:
