@@ -81,11 +81,6 @@ def read_baseline(path: Path) -> Baseline:
     return Baseline(file.slamreplay, {name: log.kept() for name, log in file.logs.items()})
 
 
-def previous_failures(baseline: Baseline) -> dict[str, frozenset[str]]:
-    """By log, the checks that failed: with a limit's `clear`, these hold again only beyond that."""
-    return {name: frozenset(log.failed) for name, log in baseline.logs.items()}
-
-
 # More than a thousand kilometres, or a million years, is no measurement.
 _Number = Annotated[float, Field(ge=-1e12, le=1e12)]
 _Ns = Annotated[int, Field(ge=-(2**62), le=2**62)]
