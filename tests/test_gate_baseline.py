@@ -119,6 +119,23 @@ def test_what_is_kept_of_measures_is_small_and_comes_back_equal(tmp_path):
     assert failed_before(baseline, "a.mcap", [source()]) == {"limit/error_max_m"}
 
 
+@pytest.mark.parametrize("name", ["a\nb.mcap", "half\udcff.mcap", "\x7f\x1b[31m", "\u2028 \u202e"])
+def test_whatever_a_log_is_called_its_baseline_can_be_read(tmp_path, name):
+    base = stored(tmp_path, {name: log(), "b": log("cd")})
+    found = compare(base, {name: log("ef"), "b": log("cd")}, RULES)
+    assert "another log" in outcome(found, name, "log").message
+    assert "there it is" not in outcome(found, name, "log").message
+    assert failed_before(base, name, [source("ef")]) == frozenset()
+
+
+def test_numbers_however_large_are_read_and_compared(tmp_path):
+    """A NEES of metres against a sigma of micrometres."""
+    base = stored(tmp_path, {"a": log(nees=3e14 * (1.0 + noise(1)), values={"nees_mean": 3e14})})
+    assert base.logs["a"].values == {"nees_mean": 3e14}
+    most = 1e59 * (1.0 + noise(2))
+    assert np.isfinite(unpaired(most, -most[::-1]).p_value)
+
+
 # What is read
 
 

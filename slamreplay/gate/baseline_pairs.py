@@ -15,7 +15,7 @@ from slamreplay.gate.baseline_difference import (
     paired,
     unpaired,
 )
-from slamreplay.gate.baseline_file import Baseline
+from slamreplay.gate.baseline_file import Baseline, kept_name
 from slamreplay.gate.baseline_kept import KeptLog, identity_of
 from slamreplay.gate.baseline_metrics import MEAN_OF, PER_LOG, expected_nees, has_side
 from slamreplay.gate.baseline_words import Compared
@@ -62,6 +62,7 @@ def failed_before(baseline: Baseline, name: str, sources: Iterable[Source]) -> f
 
 def _name_of(baseline: Baseline, name: str, identity: str) -> str | None:
     """By name and content, by content alone (it was renamed), by name alone (recorded anew)."""
+    name = kept_name(name)
     same = [other for other, old in baseline.logs.items() if old.identity == identity]
     if name in same or not same:
         return name if name in baseline.logs else None
