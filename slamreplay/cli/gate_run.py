@@ -124,7 +124,9 @@ def judged(logs: Sequence[Path], gating: Gating, output: Path | None) -> Done:
                 found.append(unread(log.as_posix(), text))
             else:
                 found.append(one)
-                measures[one.log], kept[one.log] = of_log, keep
+                # Numbers over time are judged by now, and many: of a thousand logs they fill memory.
+                measures[one.log] = replace(of_log, series={})
+                kept[one.log] = keep
             complain(f"{told}: {found[-1].status}")
         found = _compared(found, kept, gating)
         result = GateResult(gating.demands.question, gating.recipe, tuple(found))
