@@ -32,11 +32,9 @@ class Baseline:
     """What an earlier run of the gate kept.
 
     Attributes:
-        version: of the program that made it.
         logs: by name, as the command line had them.
     """
 
-    version: str
     logs: Mapping[str, KeptLog]
 
 
@@ -81,7 +79,7 @@ def read_baseline(path: Path) -> Baseline:
             said, here = (repr(u) if u else "no unit" for u in (unit[:40], metric.unit))
             raise UsageError(f"{name} is in {said} there and in {here} here", where=path,
                              hint=f"make it anew: {_HINT}")  # fmt: skip
-    return Baseline(file.slamreplay, {name: log.kept() for name, log in file.logs.items()})
+    return Baseline({name: log.kept() for name, log in file.logs.items()})
 
 
 def kept_name(name: str) -> str:
