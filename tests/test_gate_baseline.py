@@ -1,6 +1,7 @@
 """A committed baseline: what is kept, what is read, and which differences count."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -17,8 +18,8 @@ from slamreplay.gate.baseline import (
     KeptLog,
     baseline_json,
     compare,
+    failed_before,
     kept_log,
-    previous_failures,
     read_baseline,
 )
 from slamreplay.gate.baseline_difference import (
@@ -29,7 +30,7 @@ from slamreplay.gate.baseline_difference import (
     samples_of_mean,
     unpaired,
 )
-from slamreplay.gate.baseline_kept import BLOCKS_MAX, block_width, blocks_of
+from slamreplay.gate.baseline_kept import BLOCKS_MAX, block_width, blocks_of, identity_of
 from slamreplay.gate.baseline_metrics import is_worse, margin_of
 from slamreplay.gate.measures import Measure, Measures, Series
 from slamreplay.gate.outcome import Outcome
@@ -115,7 +116,24 @@ def test_what_is_kept_of_measures_is_small_and_comes_back_equal(tmp_path):
     for name in names:
         np.testing.assert_array_equal(back.over_time[name], kept.over_time[name])
     assert baseline_json(baseline.logs) == text
-    assert previous_failures(baseline) == {"a.mcap": frozenset({"limit/error_max_m"})}
+    assert failed_before(baseline, "a.mcap", [source()]) == {"limit/error_max_m"}
+
+
+@pytest.mark.parametrize("name", ["a\nb.mcap", "half\udcff.mcap", "\x7f\x1b[31m", "\u2028 \u202e"])
+def test_whatever_a_log_is_called_its_baseline_can_be_read(tmp_path, name):
+    base = stored(tmp_path, {name: log(), "b": log("cd")})
+    found = compare(base, {name: log("ef"), "b": log("cd")}, RULES)
+    assert "another log" in outcome(found, name, "log").message
+    assert "there it is" not in outcome(found, name, "log").message
+    assert failed_before(base, name, [source("ef")]) == frozenset()
+
+
+def test_numbers_however_large_are_read_and_compared(tmp_path):
+    """A NEES of metres against a sigma of micrometres."""
+    base = stored(tmp_path, {"a": log(nees=3e14 * (1.0 + noise(1)), values={"nees_mean": 3e14})})
+    assert base.logs["a"].values == {"nees_mean": 3e14}
+    most = 1e59 * (1.0 + noise(2))
+    assert np.isfinite(unpaired(most, -most[::-1]).p_value)
 
 
 # What is read
@@ -403,6 +421,19 @@ def test_logs_pair_by_content_when_renamed_and_not_at_all_when_recorded_anew(tmp
     anew = compare(base, {"old.mcap": log("cd", blocks=0.2 + noise(3))}, RULES)
     assert "another log" in outcome(anew, "old.mcap", "log").message
     assert outcome(anew, "old.mcap", "error_mean_m").status == "failed"
+
+
+def test_what_failed_before_is_of_the_log_that_it_is_held_against(tmp_path):
+    """A log that was renamed must clear its limit as well, and not that of its old name."""
+    old = {"old.mcap": ("ab", "limit/a"), "new.mcap": ("ef", "limit/b")}
+    logs = {
+        name: replace(log(), identity=identity_of([source(content)]), failed=(check,))
+        for name, (content, check) in old.items()
+    }
+    base = stored(tmp_path, logs)
+    assert failed_before(base, "new.mcap", [source("ab")]) == {"limit/a"}
+    assert failed_before(base, "new.mcap", [source("cd")]) == {"limit/b"}
+    assert failed_before(base, "third.mcap", [source("cd")]) == frozenset()
 
 
 def test_seeds_pair_and_a_run_that_lost_all_poses_is_worse(tmp_path):

@@ -12,9 +12,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from markdown_it import MarkdownIt
 
-from slamreplay.gate.github import annotations, artifacts_of, commands_stopped, step_summary
+from slamreplay.gate.github import annotations, artifacts_of, commands_stopped
 from slamreplay.gate.sarif import sarif_text
-from slamreplay.gate.step_summary import MOST_BYTES
+from slamreplay.gate.step_summary import MOST_BYTES, step_summary
 
 
 def test_one_annotation_for_each_check_worst_first():
@@ -37,6 +37,20 @@ def test_logs_that_fail_alike_share_one_on_the_recipe():
     assert (kind, given["file"]) == ("error", "ci/gate.yaml")
     assert given["title"].endswith("(7 logs of 7)")
     assert message.split("\n") == [*(f"l/{k}: found {k}" for k in range(5)), "and 2 more"]
+
+
+def test_checks_that_fail_on_most_logs_come_first_among_equals():
+    a, b, c = (gated.outcome(f"limit/{name}") for name in "abc")
+    grave = [a, b, gated.outcome("limit/d", severity="warning")]
+    made = gated.result(
+        gated.log("l/0", *grave), gated.log("l/1", *grave[1:]), gated.log("l/2", *grave[2:], c),
+        gated.log("l/3", gated.outcome("read", "error")),
+    )  # fmt: skip
+
+    taken = [given["title"].split(":")[0] for _, given, _ in commands(annotations(made))]
+    rows = [row.split("what")[0].strip() for row in rendered(step_summary(made))["tr"][1:6]]
+
+    assert taken == rows == ["read", "limit/b", "limit/a", "limit/c", "limit/d"]
 
 
 @pytest.mark.parametrize(("severity", "kind"), [("error", "error"), ("info", "notice")])

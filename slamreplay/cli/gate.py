@@ -175,7 +175,8 @@ def _end(result: GateResult, path: Path | None, github: bool) -> None:
 
 
 def _tell_github(result: GateResult) -> None:
-    from slamreplay.gate.github import annotations, artifacts_of, step_summary
+    from slamreplay.gate.github import annotations, artifacts_of
+    from slamreplay.gate.step_summary import step_summary
 
     typer.echo(annotations(result), nl=False)
     summary = os.environ.get("GITHUB_STEP_SUMMARY")

@@ -15,17 +15,17 @@ from slamreplay.cli import options
 from slamreplay.cli.progress import progress_bar
 from slamreplay.cli.terminal import complain
 from slamreplay.errors import OutputError, SlamreplayError
+from slamreplay.evidence.clean import one_line
 from slamreplay.gate.baseline import (
     ALL_LOGS,
     Baseline,
     KeptLog,
     baseline_json,
     compare,
+    failed_before,
     kept_log,
-    previous_failures,
 )
 from slamreplay.gate.gated import gated, runs_of, unread
-from slamreplay.gate.github import step_summary
 from slamreplay.gate.gitlab import code_quality_json
 from slamreplay.gate.junit import junit_xml
 from slamreplay.gate.measures import Measures
@@ -33,6 +33,7 @@ from slamreplay.gate.measuring import measures_of
 from slamreplay.gate.outcome import GatedLog, GateResult
 from slamreplay.gate.result_file import gate_json
 from slamreplay.gate.sarif import sarif_text
+from slamreplay.gate.step_summary import step_summary
 from slamreplay.postmortem import postmortem
 
 if TYPE_CHECKING:
@@ -119,11 +120,13 @@ def judged(logs: Sequence[Path], gating: Gating, output: Path | None) -> Done:
             except Exception as error:
                 # The other logs are judged all the same; the fault is told at the end.
                 fault = fault or error
-                text = " ".join(f"a fault of ours: {type(error).__name__}: {error}".split())
-                found.append(unread(log.as_posix(), text[:300]))
+                text = one_line(f"a fault of ours: {type(error).__name__}: {error}", 300)
+                found.append(unread(log.as_posix(), text))
             else:
                 found.append(one)
-                measures[one.log], kept[one.log] = of_log, keep
+                # Numbers over time are judged by now, and many: of a thousand logs they fill memory.
+                measures[one.log] = replace(of_log, series={})
+                kept[one.log] = keep
             complain(f"{told}: {found[-1].status}")
         found = _compared(found, kept, gating)
         result = GateResult(gating.demands.question, gating.recipe, tuple(found))
@@ -141,7 +144,6 @@ def _looked_at(
 ) -> tuple[GatedLog, Measures, KeptLog]:
     """One log: its post-mortem, its report where a folder is written, and what the gate says."""
     shown = log.as_posix()
-    before = {} if gating.baseline is None else previous_failures(gating.baseline)
     with (
         options.evidence([log], gating.how, cache=bundle_folder()) as bundle,
         progress_bar(f"looking back on {log.name}") as progress,
@@ -154,17 +156,18 @@ def _looked_at(
             from slamreplay.report.writer import write_report
 
             write_report(post, work / _LOGS / name)
-        measures = measures_of(post)
+        measures, sources = measures_of(post), post.manifest.sources
+        before = gating.baseline
         found = gated(
             post,
             gating.demands,
             shown,
             measures=measures,
             cause=gating.cause,
-            failed_before=before.get(shown, ()),
+            failed_before=() if before is None else failed_before(before, shown, sources),
             report=None if work is None else f"{_LOGS}/{name}",
         )
-        keep = kept_log(measures, post.manifest.sources, post.judgement.state, found.outcomes)
+        keep = kept_log(measures, sources, post.judgement.state, found.outcomes)
     return found, measures, keep
 
 

@@ -9,6 +9,7 @@ from slamreplay.evidence.clean import clean
 from slamreplay.evidence.scene import MarkKind
 from slamreplay.evidence.words import FAILURE_MODES, STATES, confidence_text
 from slamreplay.export.shown import Shown
+from slamreplay.verdict.judgement import UNDECIDED
 from slamreplay.version import __version__
 
 #: Marks of these kinds are told as states, stops or findings already.
@@ -64,7 +65,7 @@ def verdict_facts(shown: Shown) -> dict[str, str]:
 def _verdict(shown: Shown) -> list[Note]:
     judgement = shown.post.judgement
     severity: Severity = "info" if judgement.state == "healthy" else "error"
-    if judgement.state in ("unobservable", "insufficient_data"):
+    if judgement.state in UNDECIDED:
         severity = "warning"
     confidence = judgement.confidence
     sure = "" if confidence is None else f" (confidence {confidence_text(confidence)})"

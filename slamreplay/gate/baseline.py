@@ -12,9 +12,9 @@ from collections.abc import Mapping
 
 from slamreplay.consistency.answers import holm
 from slamreplay.gate.baseline_difference import UNITS_MIN
-from slamreplay.gate.baseline_file import Baseline, baseline_json, previous_failures, read_baseline
+from slamreplay.gate.baseline_file import Baseline, baseline_json, kept_name, read_baseline
 from slamreplay.gate.baseline_kept import KeptLog, kept_log
-from slamreplay.gate.baseline_pairs import match_of, of_all, of_log
+from slamreplay.gate.baseline_pairs import failed_before, match_of, of_all, of_log
 from slamreplay.gate.baseline_words import of_comparison, of_logs, of_match, of_state
 from slamreplay.gate.outcome import Outcome
 from slamreplay.gate.rules import BaselineRules
@@ -25,8 +25,8 @@ __all__ = [
     "KeptLog",
     "baseline_json",
     "compare",
+    "failed_before",
     "kept_log",
-    "previous_failures",
     "read_baseline",
 ]
 
@@ -66,7 +66,8 @@ def compare(
         if match is None:
             out[name] = [of_match(log, None, name, name)]
         else:
-            out[name] = [of_match(log, match.old, name, match.old_name), of_state(match.old, log)]
+            held = of_match(log, match.old, kept_name(name), match.old_name)
+            out[name] = [held, of_state(match.old, log)]
     gone = sorted(set(baseline.logs) - {match.old_name for match in matches.values()})
     fresh = [name for name in logs if name not in matches]
     out[ALL_LOGS] = [of_logs(len(matches), gone, fresh)]

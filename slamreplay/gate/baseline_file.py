@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,6 +23,8 @@ SCHEMA_VERSION = 1
 #: A log takes a few kilobytes; more than this is another file.
 MAX_BYTES = 50_000_000
 _HINT = "slamreplay gate ... -o DIR writes DIR/baseline.json"
+#: Half of a pair is how Python spells a byte of a path that is no UTF-8.
+_NO_NAME = re.compile("[\x00-\x1f\x7f\ud800-\udfff]")
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,11 +32,9 @@ class Baseline:
     """What an earlier run of the gate kept.
 
     Attributes:
-        version: of the program that made it.
         logs: by name, as the command line had them.
     """
 
-    version: str
     logs: Mapping[str, KeptLog]
 
 
@@ -41,13 +42,13 @@ def baseline_json(logs: Mapping[str, KeptLog]) -> str:
     """A baseline as text: same logs, same bytes; a line for each series, so that diffs are short.
 
     Args:
-        logs: by name, as the command line has them.
+        logs: by name, as the command line has them; what of a name no reader takes is spelt out.
     """
     content = {
         "schema_version": SCHEMA_VERSION,
         "slamreplay": __version__,
         "units": _units(logs.values()),
-        "logs": {name: _told(logs[name]) for name in sorted(logs)},
+        "logs": {kept_name(name): _told(logs[name]) for name in sorted(logs)},
     }
     return _text(content, 0) + "\n"
 
@@ -78,16 +79,16 @@ def read_baseline(path: Path) -> Baseline:
             said, here = (repr(u) if u else "no unit" for u in (unit[:40], metric.unit))
             raise UsageError(f"{name} is in {said} there and in {here} here", where=path,
                              hint=f"make it anew: {_HINT}")  # fmt: skip
-    return Baseline(file.slamreplay, {name: log.kept() for name, log in file.logs.items()})
+    return Baseline({name: log.kept() for name, log in file.logs.items()})
 
 
-def previous_failures(baseline: Baseline) -> dict[str, frozenset[str]]:
-    """By log, the checks that failed: with a limit's `clear`, these hold again only beyond that."""
-    return {name: frozenset(log.failed) for name, log in baseline.logs.items()}
+def kept_name(name: str) -> str:
+    """The name of a log as a baseline has it: a path may hold what is no text, or no line of it."""
+    return _NO_NAME.sub(lambda found: f"[U+{ord(found[0]):04X}]", name)
 
 
-# More than a thousand kilometres, or a million years, is no measurement.
-_Number = Annotated[float, Field(ge=-1e12, le=1e12)]
+# A NEES may be huge. Beyond this Welch's degrees of freedom, of fourth powers, are no numbers.
+_Number = Annotated[float, Field(ge=-1e60, le=1e60)]
 _Ns = Annotated[int, Field(ge=-(2**62), le=2**62)]
 _Name = Annotated[str, Field(min_length=1, max_length=4096, pattern=r"^[^\x00-\x1f\x7f]+$")]
 _Word = Annotated[str, Field(max_length=200, pattern=r"^[^\x00-\x1f\x7f]*$")]

@@ -18,9 +18,9 @@ from slamreplay.gate.baseline_metrics import MEAN_OF
 from slamreplay.gate.measures import Measure, Measures, Series
 from slamreplay.gate.outcome import Outcome
 from slamreplay.geometry.se2 import Array
+from slamreplay.geometry.times import NS_PER_S
 
 BLOCKS_MAX = 120
-_NS = 1_000_000_000
 #: Widths of a block in s: round ones, so that a log that is cut a little shorter has the same.
 _WIDTHS = (1, 2, 5, 10, 20, 30, 60, 120, 300, 600, 1200, 1800, 3600)
 #: Digits of a block's mean and of a number per log. Rounding noise of another machine lies below.
@@ -99,13 +99,13 @@ def identity_of(sources: Iterable[Source]) -> str:
 
 def block_width(duration_ns: int) -> int:
     """Width of a block in s of a log of this length."""
-    return next((w for w in _WIDTHS if duration_ns <= w * BLOCKS_MAX * _NS),
-                -(-duration_ns // (BLOCKS_MAX * _NS)))  # fmt: skip
+    return next((w for w in _WIDTHS if duration_ns <= w * BLOCKS_MAX * NS_PER_S),
+                -(-duration_ns // (BLOCKS_MAX * NS_PER_S)))  # fmt: skip
 
 
 def blocks_of(series: Series, start_ns: int, width_s: int) -> Array:
     """(B,) means of the known values in each block from the log's start on, NaN without one."""
-    block = (series.t_ns - start_ns) // (width_s * _NS)
+    block = (series.t_ns - start_ns) // (width_s * NS_PER_S)
     known = np.isfinite(series.values) & (block >= 0) & (block < BLOCKS_MAX)
     block = block[known]
     count = np.bincount(block)

@@ -18,6 +18,7 @@ MEAN_OF: dict[str, str] = {
     "changed_share": "changed_share_mean",
     "match": "match_mean",
 }
+_SERIES_OF = {mean: series for series, mean in MEAN_OF.items()}
 #: Numbers per log that are held against each other over all logs: one log has but one of each.
 PER_LOG: tuple[str, ...] = (
     "error_max_m",
@@ -73,12 +74,11 @@ _BY_UNIT = {"m": Margin(0.05), "deg": Margin(1.0), "s": Margin(0.1, 0.05)}
 
 def metric_named(name: str) -> Metric | None:
     """What a number of a baseline is, its unit above all; None where this program has none."""
-    if name == "match_mean":
-        return METRICS["match"]
-    if name == "sigma_mean_m":
-        return METRICS["sigma_m"]
     _, dot, of_trial = name.partition(".")
-    return OF_TRIALS.get(of_trial) if dot else METRICS.get(name)
+    if dot:
+        return OF_TRIALS.get(of_trial)
+    # Not every mean of a number over time can be limited: such a one is what the number is.
+    return METRICS.get(name) or METRICS.get(_SERIES_OF.get(name, ""))
 
 
 def compared(estimators: tuple[str, ...] = ()) -> tuple[str, ...]:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from slamreplay.bundle.manifest import Source
 from slamreplay.gate.baseline_difference import (
     Difference,
     over_logs,
@@ -14,8 +15,8 @@ from slamreplay.gate.baseline_difference import (
     paired,
     unpaired,
 )
-from slamreplay.gate.baseline_file import Baseline
-from slamreplay.gate.baseline_kept import KeptLog
+from slamreplay.gate.baseline_file import Baseline, kept_name
+from slamreplay.gate.baseline_kept import KeptLog, identity_of
 from slamreplay.gate.baseline_metrics import MEAN_OF, PER_LOG, expected_nees, has_side
 from slamreplay.gate.baseline_words import Compared
 from slamreplay.geometry.se2 import Array
@@ -42,14 +43,30 @@ class Match:
 
 
 def match_of(baseline: Baseline, name: str, log: KeptLog) -> Match | None:
+    """The log with the one it is held against; None where there is none."""
+    old_name = _name_of(baseline, name, log.identity)
+    return None if old_name is None else Match(old_name, baseline.logs[old_name], log)
+
+
+def failed_before(baseline: Baseline, name: str, sources: Iterable[Source]) -> frozenset[str]:
+    """Checks of a log that failed: with a limit's `clear`, these hold again only beyond that.
+
+    Args:
+        baseline: of an earlier run.
+        name: of the log now.
+        sources: its files, as its manifest has them.
+    """
+    old_name = _name_of(baseline, name, identity_of(sources))
+    return frozenset() if old_name is None else frozenset(baseline.logs[old_name].failed)
+
+
+def _name_of(baseline: Baseline, name: str, identity: str) -> str | None:
     """By name and content, by content alone (it was renamed), by name alone (recorded anew)."""
-    same_name = baseline.logs.get(name)
-    if same_name is not None and same_name.identity == log.identity:
-        return Match(name, same_name, log)
-    for other, old in baseline.logs.items():
-        if old.identity == log.identity:
-            return Match(other, old, log)
-    return None if same_name is None else Match(name, same_name, log)
+    name = kept_name(name)
+    same = [other for other, old in baseline.logs.items() if old.identity == identity]
+    if name in same or not same:
+        return name if name in baseline.logs else None
+    return same[0]
 
 
 def of_log(match: Match) -> Iterator[Compared]:

@@ -15,8 +15,8 @@ from slamreplay.gate.baseline_metrics import is_worse, margin_of, metric_named
 from slamreplay.gate.outcome import Outcome, Status
 from slamreplay.gate.rules import BaselineRules
 from slamreplay.geometry.se2 import Array
+from slamreplay.geometry.times import NS_PER_S
 
-_NS = 1_000_000_000
 #: How well a robot fares, the best first; what could not be judged lies between.
 _RANK = ("healthy", "map_changed", "unobservable", "insufficient_data", "lost",
          "lost_and_map_changed")  # fmt: skip
@@ -170,8 +170,8 @@ def _worst_block(one: Compared) -> tuple[int, int]:
     assert one.difference is not None
     step = (one.blocks[1] - one.blocks[0]) * math.copysign(1.0, one.difference.mean)
     block = int(np.nanargmax(step))
-    start = one.start_ns + block * one.block_s * _NS
-    return start, start + one.block_s * _NS
+    start = one.start_ns + block * one.block_s * NS_PER_S
+    return start, start + one.block_s * NS_PER_S
 
 
 def _change(d: Difference, unit: str) -> str:

@@ -8,11 +8,9 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from hashlib import sha256
 
-from slamreplay.bundle.findings import Severity
+from slamreplay.bundle.findings import SEVERITIES, Severity
 from slamreplay.gate.outcome import GatedLog, GateResult, Outcome
 from slamreplay.geometry.times import decimal_seconds
-
-_WORST = {"error": 0, "warning": 1, "info": 2}
 
 
 def told(outcome: Outcome) -> str:
@@ -65,7 +63,21 @@ def failures(result: GateResult) -> list[Failure]:
                 named = outcome.check, relative(log.log)
                 seen[named] += 1
                 found.append(Failure(log, outcome, seen[named]))
-    return sorted(found, key=lambda x: (x.outcome.status != "error", _WORST[x.severity]))
+    return sorted(found, key=lambda x: (x.outcome.status != "error", _rank(x.severity)))
+
+
+def grouped(found: Iterable[Failure]) -> list[list[Failure]]:
+    """Those of one check and severity together, the worst first, then those on most logs.
+
+    Args:
+        found: as of `failures`.
+    """
+    groups: dict[tuple[bool, Severity, str], list[Failure]] = {}
+    for one in found:
+        key = one.outcome.status != "error", one.severity, one.outcome.check
+        groups.setdefault(key, []).append(one)
+    ranked = sorted(groups.items(), key=lambda x: (x[0][0], _rank(x[0][1]), -len(x[1])))
+    return [group for _, group in ranked]
 
 
 def relative(path: str) -> str:
@@ -82,3 +94,8 @@ def span_s(log: GatedLog, outcome: Outcome) -> tuple[str, ...]:
         return ()
     times = (outcome.start_ns, outcome.end_ns)
     return tuple(decimal_seconds(t - log.start_ns)[:-6] for t in times if t is not None)
+
+
+def _rank(severity: Severity) -> int:
+    """The worst is the least."""
+    return -SEVERITIES.index(severity)

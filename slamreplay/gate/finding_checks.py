@@ -8,9 +8,8 @@ from slamreplay.bundle.findings import FINDINGS, SEVERITIES, Finding, Severity
 from slamreplay.evidence.result import Postmortem
 from slamreplay.gate.asked import Asked, asked
 from slamreplay.gate.outcome import Outcome
-from slamreplay.verdict.judgement import Interval
+from slamreplay.verdict.judgement import UNDECIDED, Interval
 
-_UNDECIDED = ("unobservable", "insufficient_data")
 #: So many findings are quoted in one sentence.
 _QUOTED = 3
 
@@ -119,7 +118,7 @@ def severity(most: Severity, expected_texts: Sequence[str], post: Postmortem) ->
             worse[0].start_ns,
             worse[0].end_ns,
         )
-    elif post.judgement.state in _UNDECIDED:
+    elif post.judgement.state in UNDECIDED:
         why = f"the log could not be judged: {post.judgement.summary}"
         yield Outcome("severity", title, "skipped", "error", why)
     else:
@@ -163,7 +162,7 @@ def _of_finding(
 def _actual(entry: Asked, post: Postmortem, *, cause: bool) -> tuple[str | None, str]:
     """What the log has of a kind, None where it cannot be told, and a sentence."""
     judgement = post.judgement
-    undecided = judgement.state in _UNDECIDED
+    undecided = judgement.state in UNDECIDED
     if entry.kind == "state":
         # Whether a log that cannot be judged is in another state nobody knows.
         named = undecided and not entry.fits(judgement.state)
@@ -194,7 +193,7 @@ def _excused(entries: Collection[Asked], post: Postmortem) -> set[str]:
 
 def _made(interval: Interval, state: str) -> bool:
     """Whether an interval is of what the log's state says."""
-    if state in _UNDECIDED:
+    if state in UNDECIDED:
         return interval.state == state
     lost = interval.is_lost and "lost" in state
     return lost or (interval.is_changed and "map_changed" in state)

@@ -12,11 +12,8 @@ from secrets import token_hex
 
 from slamreplay.bundle.findings import Severity
 from slamreplay.evidence.clean import clean, one_line, straight
-from slamreplay.gate.failures import Failure, failures, logs_of, relative
+from slamreplay.gate.failures import Failure, failures, grouped, logs_of, relative
 from slamreplay.gate.outcome import GateResult
-from slamreplay.gate.step_summary import step_summary
-
-__all__ = ["annotations", "artifacts_of", "commands_stopped", "step_summary"]
 
 _COMMAND: dict[Severity, str] = {"error": "error", "warning": "warning", "info": "notice"}
 #: Annotations of one kind that the runner takes from a step.
@@ -36,7 +33,7 @@ def annotations(result: GateResult) -> str:
     of the same severity the one that fails on most logs. It is put on the log, or on the recipe
     where there are several. The same result gives the same text.
     """
-    groups = _groups(failures(result))
+    groups = grouped(failures(result))
     lines: list[str] = []
     left_out: list[list[Failure]] = []
     for command in ("error", "warning", "notice"):
@@ -84,17 +81,6 @@ def commands_stopped(write: Callable[[str], object]) -> Iterator[None]:
         yield
     finally:
         write(f"::{token}::\n")
-
-
-def _groups(found: list[Failure]) -> list[list[Failure]]:
-    groups: dict[tuple[bool, Severity, str], list[Failure]] = {}
-    for failure in found:
-        unreadable = failure.outcome.status == "error"
-        key = unreadable, failure.severity, failure.outcome.check
-        groups.setdefault(key, []).append(failure)
-    ranks = {"error": 0, "warning": 1, "info": 2}
-    by_rank = sorted(groups.items(), key=lambda x: (not x[0][0], ranks[x[0][1]], -len(x[1])))
-    return [group for _, group in by_rank]
 
 
 def _line(command: str, group: list[Failure], result: GateResult) -> str:

@@ -7,8 +7,7 @@ from numpy.typing import NDArray
 
 from slamreplay.evidence.result import Postmortem
 from slamreplay.verdict.belief_error import judgeable
-
-_UNDECIDED = ("unobservable", "insufficient_data")
+from slamreplay.verdict.judgement import UNDECIDED
 
 
 def judged_moments(post: Postmortem, t_ns: NDArray[np.int64]) -> NDArray[np.bool_]:
@@ -22,11 +21,11 @@ def judged_moments(post: Postmortem, t_ns: NDArray[np.int64]) -> NDArray[np.bool
         return np.zeros(len(t_ns), dtype=bool)
     inside = np.zeros(len(t_ns), dtype=bool)
     for interval in post.judgement.intervals:
-        if interval.state not in _UNDECIDED:
+        if interval.state not in UNDECIDED:
             # The last one holds its end as well: a log's last scan may be its last moment.
             inside |= (t_ns >= interval.start_ns) & (t_ns <= interval.end_ns)
     for interval in post.judgement.intervals:
-        if interval.state in _UNDECIDED:
+        if interval.state in UNDECIDED:
             inside &= ~((t_ns >= interval.start_ns) & (t_ns < interval.end_ns))
     order = np.argsort(hindsight.track.t_ns, kind="stable")
     row = np.searchsorted(hindsight.track.t_ns[order], t_ns, side="right") - 1
@@ -47,6 +46,6 @@ def why_unjudged(post: Postmortem, otherwise: str) -> str:
         return "no scans"
     if post.belief is None or not post.belief.has_pose.any():
         return "no localizer spoke"
-    if post.judgement.state in _UNDECIDED:
+    if post.judgement.state in UNDECIDED:
         return post.judgement.summary.rstrip(".")
     return otherwise

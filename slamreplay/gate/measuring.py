@@ -16,11 +16,10 @@ from slamreplay.gate.measured_trials import trial_numbers
 from slamreplay.gate.measures import Answer, Measure, Measures, Series, mean_of, p95_of
 from slamreplay.gate.metrics import METRICS
 from slamreplay.geometry.times import NS_PER_S
-from slamreplay.verdict.judgement import Interval
+from slamreplay.verdict.judgement import UNDECIDED, Interval
 
 #: Lanes that mean nothing at moments that the verdict could not judge.
 _JUDGED_LANES = ("error_m", "error_deg", "changed_share")
-_UNDECIDED = ("unobservable", "insufficient_data")
 
 
 def measures_of(post: Postmortem) -> Measures:
@@ -100,7 +99,7 @@ def _time_numbers(post: Postmortem) -> Iterator[tuple[str, Answer]]:
     intervals = post.judgement.intervals
     whole_s = (post.manifest.end_ns - post.manifest.start_ns) / NS_PER_S
     yield "duration_s", Measure(whole_s, "s")
-    unjudged_s = _seconds(i for i in intervals if i.state in _UNDECIDED)
+    unjudged_s = _seconds(i for i in intervals if i.state in UNDECIDED)
     yield "unjudged_s", Measure(unjudged_s, "s")
     judged_s = _seconds(intervals) - unjudged_s
     share: Answer = "the log has no length"

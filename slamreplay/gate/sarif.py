@@ -17,7 +17,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 from urllib.parse import quote
 
-from slamreplay.bundle.findings import Severity
+from slamreplay.bundle.findings import SEVERITIES, Severity
 from slamreplay.evidence.clean import clean, one_line, straight
 from slamreplay.gate.check_texts import check_texts
 from slamreplay.gate.failures import Failure, failures, relative, span_s, told
@@ -120,8 +120,8 @@ def _rules(result: GateResult, kept: Sequence[Failure]) -> list[dict[str, Any]]:
 def _rule(check: str, outcomes: Sequence[Outcome]) -> dict[str, Any]:
     titles = {outcome.title for outcome in outcomes}
     texts = check_texts(check, titles.pop() if len(titles) == 1 else "")
-    found = {"error" if x.status == "error" else x.severity for x in outcomes}
-    worst: Severity = "error" if "error" in found else "warning" if "warning" in found else "info"
+    found: set[Severity] = {"error" if x.status == "error" else x.severity for x in outcomes}
+    worst = max(found, key=SEVERITIES.index)
     kind = check.partition("/")[0]
     return {
         "id": check,

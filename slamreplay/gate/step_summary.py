@@ -7,7 +7,7 @@ from urllib.parse import quote
 
 from slamreplay.evidence.clean import as_markdown, clean, one_line
 from slamreplay.evidence.words import STATES
-from slamreplay.gate.failures import Failure, failures, logs_of, told
+from slamreplay.gate.failures import Failure, failures, grouped, logs_of, told
 from slamreplay.gate.outcome import STATUSES, GatedLog, GateResult, Status
 
 #: GitHub refuses a summary of more than 1 MiB (all that one step wrote to it), and shows nothing.
@@ -77,17 +77,14 @@ def _head(result: GateResult) -> str:
 
 
 def _by_check(found: Sequence[Failure], result: GateResult) -> list[tuple[str, ...]]:
-    groups: dict[tuple[str, str], list[Failure]] = {}
-    for failure in found:
-        groups.setdefault((failure.outcome.check, failure.severity), []).append(failure)
     return [
         (
-            f"{_cell(check)}<br>{_cell(group[0].outcome.title)}",
-            severity,
+            f"{_cell(group[0].outcome.check)}<br>{_cell(group[0].outcome.title)}",
+            group[0].severity,
             f"{logs_of(group)} of {len(result.single)}" if logs_of(group) else "all together",
             _quoted((failure.outcome.message for failure in group), len(group), 1),
         )
-        for (check, severity), group in groups.items()
+        for group in grouped(found)
     ]
 
 

@@ -6,6 +6,7 @@ from slamreplay.bundle.findings import FINDINGS
 from slamreplay.consistency.evidence.parts import HEADING, POSE, POSITION
 from slamreplay.consistency.evidence.source import SHARED_KINDS
 from slamreplay.evidence.result import Postmortem
+from slamreplay.verdict.judgement import UNDECIDED
 
 _NEEDS_BELIEF = ("SR-LOC-001", "SR-MAP-FRAME", "SR-CON-001", "SR-CON-002")
 _NEEDS_HINDSIGHT = ("SR-LOC-001", "SR-LOC-002", "SR-MAP-001", "SR-MAP-FRAME", "SR-MAP-WRONG")
@@ -29,7 +30,7 @@ def not_assessable(post: Postmortem) -> dict[str, str]:
     ]
     if undecided and not _decided(post):
         reasons.setdefault("SR-CON-001", undecided[0].message)
-    if post.judgement.state in ("unobservable", "insufficient_data"):
+    if post.judgement.state in UNDECIDED:
         for id_ in ("SR-LOC-001", "SR-MAP-001", "SR-MAP-FRAME"):
             reasons.setdefault(id_, post.judgement.summary.rstrip("."))
     answered = {finding.id for finding in post.findings}

@@ -17,7 +17,7 @@ from slamreplay.verdict.clearance import Clearance, Obstacles
 from slamreplay.verdict.contract import Contract
 from slamreplay.verdict.gate import allows, ratio, sigma_towards
 from slamreplay.verdict.goals import recoveries
-from slamreplay.verdict.judgement import Action, Interval
+from slamreplay.verdict.judgement import UNDECIDED, Action, Interval
 from slamreplay.verdict.limits import Limits
 from slamreplay.verdict.motion import motion_starts
 from slamreplay.verdict.paths import Paths
@@ -197,7 +197,7 @@ def _needless(
     if kind != "recovery" or outcome is None or error_m is None:
         return None
     state = next((i.state for i in outcome.intervals if i.start_ns <= t_ns < i.end_ns), None)
-    if state in (None, "insufficient_data", "unobservable"):
+    if state is None or state in UNDECIDED:
         return None
     return state == "healthy" and error_m <= RIGHT * limits.position_m
 

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import pairwise
 
-from slamreplay.verdict.judgement import Interval, State
+from slamreplay.verdict.judgement import UNDECIDED, Interval, State
 from slamreplay.verdict.limits import Limits
 from slamreplay.verdict.timeline import BAD, UNKNOWN, Timeline
 
@@ -58,7 +58,7 @@ def log_state(intervals: Sequence[Interval], limits: Limits) -> State:
 
 def log_confidence(state: State, intervals: Sequence[Interval]) -> float | None:
     """The mean of the intervals that made the state, each by its length; None if undecided."""
-    if state in ("insufficient_data", "unobservable"):
+    if state in UNDECIDED:
         return None
     wants = {
         "lost": ("lost", "lost_and_map_changed"),

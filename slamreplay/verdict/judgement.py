@@ -20,6 +20,8 @@ STATES: tuple[State, ...] = (
     "unobservable",
     "insufficient_data",
 )
+#: Of these nothing was decided.
+UNDECIDED: tuple[State, ...] = ("unobservable", "insufficient_data")
 
 FailureKind = Literal[
     "sensing_ambiguity",

@@ -8,7 +8,14 @@ import numpy as np
 
 from slamreplay.bundle.products import Changes
 from slamreplay.geometry.times import NS_PER_S
-from slamreplay.verdict.judgement import ConstantOffset, FailureMode, Interval, State, Stop
+from slamreplay.verdict.judgement import (
+    UNDECIDED,
+    ConstantOffset,
+    FailureMode,
+    Interval,
+    State,
+    Stop,
+)
 from slamreplay.verdict.words import BECAUSE
 
 #: Nobody reads more at the start of a shift; what does not fit is left to the page.
@@ -64,7 +71,7 @@ def summary(
     tells_of_map = state in ("map_changed", "lost_and_map_changed")
     if doubt is not None and tells_of_map:
         clauses.insert(1, doubt)
-    if stops and state not in ("insufficient_data", "unobservable"):
+    if stops and state not in UNDECIDED:
         stopped = _stopped(stops, start_ns, has_belief=has_belief)
         clauses.insert(2 if doubt is not None and tells_of_map else 1, stopped)
     text = clauses[0]

@@ -15,7 +15,7 @@ from slamreplay.geometry.times import ns
 from slamreplay.verdict.belief_error import BeliefError, belief_error
 from slamreplay.verdict.confidence import confidence, p_changed, p_off, trust
 from slamreplay.verdict.intervals import tiled
-from slamreplay.verdict.judgement import ConstantOffset, Interval
+from slamreplay.verdict.judgement import UNDECIDED, ConstantOffset, Interval
 from slamreplay.verdict.limits import Limits
 from slamreplay.verdict.map_frame import constant_offset
 from slamreplay.verdict.timeline import BAD, GOOD, UNKNOWN, held, settled
@@ -137,7 +137,7 @@ def _numbered(tile: Interval, evidence: Evidence, limits: Limits) -> Interval:
     if offset is not None and (tile.is_lost or offset.cause == "map"):
         ids = (*ids, *(("SR-MAP-FRAME",) if offset.cause != "lookalike" else ()))
     sure = None
-    if tile.state not in ("insufficient_data", "unobservable"):
+    if tile.state not in UNDECIDED:
         p = p_off(error, limits)[inside]
         # Before the first belief either may be true: then the map alone is judged.
         unspoken = 1.0 - float(np.isfinite(p).mean()) if len(p) else 0.0

@@ -11,6 +11,7 @@ import numpy as np
 from slamreplay.evidence.result import Postmortem
 from slamreplay.simulate.recording import Recording
 from slamreplay.simulate.topics import START_NS
+from slamreplay.verdict.judgement import UNDECIDED
 
 #: Numbers that differ by no more than this share of the larger are the same answer.
 _SAME = 0.1
@@ -51,7 +52,7 @@ NONE = Answer()
 def _state(post: Postmortem, _: Recording) -> Answer:
     """The verdict; half of it where no belief was recorded."""
     state = post.judgement.state
-    if state in ("insufficient_data", "unobservable"):
+    if state in UNDECIDED:
         return NONE
     if post.belief is None or not post.belief.has_pose.any():
         half = "map changed" if "changed" in state else "map right"

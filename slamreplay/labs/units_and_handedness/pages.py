@@ -10,6 +10,7 @@ from typing import Any, Literal
 from slamreplay.labs.lab import LabResults, ResultTable
 from slamreplay.labs.units_and_handedness.trials import OFF_M, OFF_RAD, Confused, Ran
 from slamreplay.report.figures.matrix import Cell, matrix_figure
+from slamreplay.verdict.judgement import UNDECIDED
 
 _TITLE = "Confusions on a healthy log"
 _LEGEND = {
@@ -52,7 +53,7 @@ def results(found: Mapping[str | None, Confused]) -> LabResults:
 def _cells(one: Confused, whole: Confused) -> list[Cell]:
     cells = [Cell(name, _error(ran), _of_run(ran)) for name, ran in one.ran.items()]
     lost: Became = "same" if one.state == whole.state else "other"
-    if one.state in ("insufficient_data", "unobservable"):
+    if one.state in UNDECIDED:
         lost = "none"
     mode = "" if one.mode == "none" else f": {one.mode.replace('_', ' ')}"
     cells.append(Cell("verdict", f"{one.state.replace('_', ' ')}{mode}", lost))
