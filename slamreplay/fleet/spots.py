@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from slamreplay.consistency.statistics.shares import wilson
 from slamreplay.fleet.answers import SPOT_M, Share, Spot
 from slamreplay.fleet.counted import Counted
 from slamreplay.fleet.gathered import ENTERED, HERE, LOST, PASSED, SPOT_LOGS, Gathered
-from slamreplay.fleet.intervals import wilson
 
 #: Spots that fewer logs passed, or that robots were at for less time, tell nothing of the place.
 LEAST_LOGS, LEAST_S = 3, 30.0
