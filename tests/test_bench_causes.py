@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 
 from slamreplay.bench.cause_fit import Played, record_of, said
 from slamreplay.bench.cause_runner import cause_or_failed, causes_of
-from slamreplay.bench.cause_scores import cause_scores, wilson
+from slamreplay.bench.cause_scores import cause_scores, counted
 from slamreplay.bench.cause_table import causes_page
 from slamreplay.bench.faults import on_sensing
 from slamreplay.bench.incidents import ALL_KINDS, KINDS, Incident, story_of
@@ -238,13 +238,13 @@ def log(kind="wheel_slip", seed=1, *, said="odometry_slip", p=0.9, ranked=(), ha
     return Measured(Case(kind, seed), facts)
 
 
-def test_wilson_interval_is_that_of_scipy():
+def test_a_share_stands_with_wilsons_interval():
     from scipy.stats import binomtest
 
     for right, of in ((0, 5), (18, 20), (20, 20), (90, 100)):
         oracle = binomtest(right, of).proportion_ci(0.95, "wilson")
-        assert wilson(right, of) == pytest.approx((oracle.low, oracle.high))
-    assert wilson(0, 0) == (0.0, 1.0)
+        assert counted(right, of) == pytest.approx([right / of, oracle.low, oracle.high])
+    assert counted(0, 0) == [None, 0.0, 1.0]
 
 
 def test_confusion_counts_right_wrong_and_sets_of_right_answers():

@@ -6,6 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
+from slamreplay.consistency.statistics.shares import wilson
 from slamreplay.fleet.intervals import (
     dispersion,
     effective,
@@ -13,7 +14,6 @@ from slamreplay.fleet.intervals import (
     garwood,
     intraclass_correlation,
     newcombe,
-    wilson,
 )
 
 

@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from slamreplay.bench.cause_scores import wilson
+from slamreplay.bench.cause_scores import counted
 from slamreplay.bench.incidents import ALL_KINDS, incident
 from slamreplay.bench.known_cause import known_cause
 from slamreplay.bench.logs import bundle_of
@@ -126,7 +126,7 @@ def record_of(cases: Sequence[Played]) -> dict[str, Any]:
         "seeds": sorted({c.seed for c in cases}),
         "cross_validated": {
             "right": int(right.sum()),
-            "interval": wilson(int(right.sum()), len(right)),
+            "interval": counted(int(right.sum()), len(right))[1:],
             "ece": sum(gap) / max(len(p), 1),
         },
     }

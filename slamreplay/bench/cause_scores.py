@@ -8,9 +8,9 @@ from dataclasses import asdict
 from typing import Any, get_args
 
 import numpy as np
-from scipy.special import ndtri
 
 from slamreplay.bench.measure import Measured
+from slamreplay.consistency.statistics.shares import wilson
 from slamreplay.verdict.judgement import FailureKind
 from slamreplay.verdict.reliability import Bin
 
@@ -19,15 +19,10 @@ NAMES: tuple[str, ...] = get_args(FailureKind)
 _BINS = 10
 
 
-def wilson(right: int, of: int, level: float = 0.95) -> tuple[float, float]:
-    """Interval of a share (Wilson, 1927); the whole range where nothing was counted."""
-    if not of:
-        return 0.0, 1.0
-    z = float(ndtri(0.5 + level / 2.0))
-    p, z2 = right / of, z * z / of
-    half = z / (1.0 + z2) * float(np.sqrt(p * (1.0 - p) / of + z2 / (4.0 * of)))
-    centre = (p + z2 / 2.0) / (1.0 + z2)
-    return max(centre - half, 0.0), min(centre + half, 1.0)
+def counted(right: int, of: int) -> list[float | None]:
+    """A share and its 95 % interval; None with the whole range where nothing was counted."""
+    share = right / of if of else None
+    return [share, *wilson(share or 0.0, of)]
 
 
 def cause_scores(logs: Sequence[Measured], name: str) -> dict[str, Any]:
@@ -57,12 +52,11 @@ def cause_scores(logs: Sequence[Measured], name: str) -> dict[str, Any]:
         "unknown_cause": len(unknown),
         "incidents": of,
         "right": right,
-        "accuracy": [right / of if of else None, *wilson(right, of)],
+        "accuracy": counted(right, of),
         "balanced_accuracy": float(np.mean([r["share"][0] for r in recalls.values()]))
         if recalls
         else None,
-        "among_first_two": [_first_two(known, name) / of if of else None,
-                            *wilson(_first_two(known, name), of)],
+        "among_first_two": counted(_first_two(known, name), of),
         "by_label": recalls,
         "by_kind": _by_kind(known, name),
         "confusion": confusion(known + calm, name),
@@ -122,7 +116,7 @@ def _place(label: str) -> int:
 
 def _share(logs: Sequence[Measured], name: str) -> dict[str, Any]:
     right = sum(is_named(m, name) for m in logs)
-    return {"logs": len(logs), "share": [right / len(logs), *wilson(right, len(logs))]}
+    return {"logs": len(logs), "share": counted(right, len(logs))}
 
 
 def _recalls(logs: Sequence[Measured], name: str) -> dict[str, Any]:

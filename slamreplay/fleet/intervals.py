@@ -11,22 +11,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from slamreplay.consistency.statistics.shares import wilson
 from slamreplay.geometry import se2
 
-#: 97.5 % quantile of the normal distribution: all intervals are of 95 %.
-Z = 1.959963984540054
+#: Of all intervals.
 _LEVEL = 0.95
-
-
-def wilson(share: float, n: float) -> tuple[float, float]:
-    """Wilson's score interval (Wilson 1927) of a share of `n` independent ones, n > 0.
-
-    `n` need not be whole: it is the effective number (Korn and Graubard 1998).
-    """
-    middle = share + Z * Z / (2.0 * n)
-    half = Z * np.sqrt(share * (1.0 - share) / n + Z * Z / (4.0 * n * n))
-    scale = 1.0 + Z * Z / n
-    return max(0.0, float(middle - half) / scale), min(1.0, float(middle + half) / scale)
 
 
 def newcombe(was: tuple[float, float], now: tuple[float, float]) -> tuple[float, float]:

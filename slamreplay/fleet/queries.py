@@ -12,10 +12,10 @@ from importlib.resources import files
 from pathlib import Path
 from string import Template
 
+from slamreplay.consistency.statistics.shares import Z
 from slamreplay.fleet import areas, changed_regions, course, in_use, picks, spots
 from slamreplay.fleet.answers import DIMENSIONS, LEAST_LOGS, NEAR_M, SPOT_M
 from slamreplay.fleet.cells import AGAINST_M2, LOOK_M2, SPOT
-from slamreplay.fleet.intervals import Z
 from slamreplay.fleet.schema import PLACE_M, TABLES
 
 _WORDS = {"map_version": "map version", "software": "software version"}

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from slamreplay.consistency.statistics.shares import wilson
 from slamreplay.fleet.answers import SPOT_M, Share, Spot
-from slamreplay.fleet.cells import split
 from slamreplay.fleet.counted import Counted
 from slamreplay.fleet.gathered import ENTERED, HERE, LOST, PASSED, SPOT_LOGS, Gathered
-from slamreplay.fleet.intervals import wilson
 
 #: Spots that fewer logs passed, or that robots were at for less time, tell nothing of the place.
 LEAST_LOGS, LEAST_S = 3, 30.0
@@ -64,9 +63,3 @@ def spot_of_loss(found: Gathered) -> dict[int, int]:
     order = np.lexsort((lost.spot, -lost.lost_s, lost.log))
     log, first = np.unique(lost.log[order], return_index=True)
     return dict(zip(log.tolist(), lost.spot[order][first].tolist(), strict=True))
-
-
-def spot_box(code: int) -> tuple[float, float, float, float]:
-    """The square of a spot, in the frame of its map."""
-    _, col, row = (int(part[0]) for part in split(np.array([code], dtype=np.int64)))
-    return col * SPOT_M, row * SPOT_M, (col + 1) * SPOT_M, (row + 1) * SPOT_M

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from slamreplay.consistency.statistics.shares import wilson
 from slamreplay.fleet.answers import DIMENSIONS, Dimension, Group, Rate, Share
 from slamreplay.fleet.counted import Counted, Flags, groups
 from slamreplay.fleet.intervals import (
@@ -14,7 +15,6 @@ from slamreplay.fleet.intervals import (
     effective,
     garwood,
     intraclass_correlation,
-    wilson,
 )
 from slamreplay.geometry import se2
 from slamreplay.verdict.judgement import STATES
