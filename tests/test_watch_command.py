@@ -3,6 +3,7 @@
 import json
 import signal
 import time
+from pathlib import Path
 
 import pytest
 from batch_folders import (
@@ -15,6 +16,8 @@ from batch_folders import (
     workers_of,
     write_tiny_log,
 )
+
+BENCH = Path(__file__).resolve().parents[1] / "recipes" / "wheel-slip" / "recipe.yaml"
 
 
 @pytest.fixture
@@ -69,6 +72,8 @@ def test_once_on_nothing_new(place, tmp_path):
     [
         (("misspelt", "-o", "out"), "there is no such folder"),
         ((".", "-o", "out"), "lies in the folder that is watched"),
+        (("file://{here}", "-o", "out"), "lies in the folder that is watched"),
+        (("in", "-o", "out", "--recipe", "{bench}"), "it is no gate"),
         (("in", "-o", "out", "--on-finished", "'"), "--on-finished: No closing quotation"),
         (("in", "-o", "out", "--on-finished", " "), "--on-finished has no command"),
         (("in", "-o", "out", "--workers", "0"), "0 workers do no work"),
@@ -80,6 +85,7 @@ def test_what_makes_no_sense_gets_one_line(place, tmp_path, options, line, monke
     from slamreplay.cli.main import run
 
     monkeypatch.chdir(tmp_path)
+    options = [text.format(here=tmp_path, bench=BENCH) for text in options]
     monkeypatch.setattr("sys.argv", ["slamreplay", "watch", *options])
 
     assert run() == 2

@@ -7,19 +7,27 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from slamreplay.cli.options import Json
+from slamreplay.cli.batch_options import (
+    INTERRUPTED,
+    TERMINATED,
+    Count,
+    LogTimeout,
+    Maps,
+    MemoryLimit,
+    Output,
+    Recipe,
+    Scheduler,
+    Storage,
+)
+from slamreplay.cli.options import Cause, Json
 from slamreplay.cli.terminal import complain, say, say_json, say_path
-from slamreplay.errors import UsageError
 
 if TYPE_CHECKING:
     from slamreplay.batch.run import BatchEnd
-    from slamreplay.gate.rules import Demands
 
 #: So many failed logs are told with their line; all of them stand in the tables.
 _MOST_FAILED = 10
 _UNREADABLE = 2
-#: As shells tell of what a signal ended.
-INTERRUPTED, TERMINATED = 130, 143
 
 Places = Annotated[
     list[str],
@@ -27,44 +35,6 @@ Places = Annotated[
         metavar="PLACE...",
         help="Folders, logs, patterns ('logs/**/*.mcap'), addresses (s3://...), manifests.",
     ),
-]
-Output = Annotated[
-    Path,
-    typer.Option("-o", "--output", metavar="DIR", help="Where reports, tables and the page go."),
-]
-Maps = Annotated[
-    str | None,
-    typer.Option("--maps", metavar="CSV", help="Which logs were driven on which map, with labels."),
-]
-Recipe = Annotated[
-    Path | None, typer.Option("--recipe", metavar="YAML", help="Hold each log against this gate.")
-]
-Storage = Annotated[
-    list[str] | None,
-    typer.Option("--storage", metavar="KEY=VALUE", help="Option of fsspec for addresses."),
-]
-Scheduler = Annotated[
-    str | None,
-    typer.Option("--scheduler", metavar="ADDRESS", help="A dask cluster, as tcp://HOST:8786."),
-]
-Count = Annotated[
-    int | None,
-    typer.Option("--workers", metavar="N", help="Processes here; one per core by default."),
-]
-MemoryLimit = Annotated[
-    str | None,
-    typer.Option(
-        "--memory-limit", metavar="SIZE", help="A worker beyond it is started anew, as 4GiB."
-    ),
-]
-LogTimeout = Annotated[
-    float,
-    typer.Option(
-        "--log-timeout", metavar="S", help="A log that takes longer fails, in s, fetching included."
-    ),
-]
-Cause = Annotated[
-    bool, typer.Option("--cause/--no-cause", help="Replay what went wrong to name its root cause.")
 ]
 AgainFailed = Annotated[
     bool, typer.Option("--again-failed", help="Try logs again that failed before.")
@@ -100,6 +70,7 @@ def _batch(
     from slamreplay.batch.stopping import Stopped, stoppable
     from slamreplay.batch.stores import storage_options
     from slamreplay.cli.progress import progress_bar
+    from slamreplay.recipes import read_demands
 
     who = Workers(workers, memory_limit, scheduler, log_timeout_s).checked()
     demands = None if recipe is None else read_demands(recipe)
@@ -127,20 +98,6 @@ def _batch(
     if len(end.failed) == end.logs:
         complain(f"slamreplay: none of the {end.logs} logs could be looked back on")
         raise typer.Exit(_UNREADABLE)
-
-
-def read_demands(recipe: Path) -> Demands:
-    """The demands of a gate's recipe.
-
-    Raises:
-        UsageError: as of `read_recipe`, or it is another kind of recipe.
-    """
-    from slamreplay.recipes import GateRecipe, read_recipe
-
-    read = read_recipe(recipe)
-    if not isinstance(read, GateRecipe):
-        raise UsageError("is no recipe of a gate", where=recipe, hint="see recipes/ci-gate")
-    return read.demands
 
 
 def _as_json(end: BatchEnd, output: Path) -> dict[str, object]:

@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from slamreplay.cli import completion, options
-from slamreplay.cli.report import Cause
 from slamreplay.cli.terminal import complain, say_json, say_path
 from slamreplay.errors import OutputError, UsageError
 
@@ -81,7 +80,7 @@ def gate(
     map_yaml: options.MapYaml = None,
     topics: options.Topics = None,
     robot: options.Robot = None,
-    cause: Cause = True,
+    cause: options.Cause = True,
     as_json: options.Json = False,
 ) -> None:
     """Hold each log against a recipe's demands.

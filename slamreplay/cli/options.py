@@ -52,6 +52,13 @@ End = Annotated[
     float | None,
     typer.Option("--end", metavar="S", help="Leave out what is later, in s from the start."),
 ]
+Cause = Annotated[
+    bool,
+    typer.Option(
+        "--cause/--no-cause",
+        help="Replay what went wrong with one thing put right at a time, to name its root cause.",
+    ),
+]
 #: Seeds from here on leave no room for those of several trials in 64 bits.
 SEED_END = 2**62
 

@@ -12,6 +12,7 @@ import typer
 from slamreplay.bundle.findings import SEVERITIES, Severity
 from slamreplay.cli import completion
 from slamreplay.cli.options import (
+    Cause,
     End,
     Json,
     MapYaml,
@@ -76,14 +77,6 @@ Trace = Annotated[
         "--trace",
         metavar="S",
         help="Tell which measurements moved the belief around this moment, in s from the start.",
-    ),
-]
-
-Cause = Annotated[
-    bool,
-    typer.Option(
-        "--cause/--no-cause",
-        help="Replay what went wrong with one thing put right at a time, to name its root cause.",
     ),
 ]
 

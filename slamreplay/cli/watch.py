@@ -11,10 +11,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from slamreplay.cli.batch import (
+from slamreplay.cli.batch_options import (
     INTERRUPTED,
     TERMINATED,
-    Cause,
     Count,
     LogTimeout,
     Maps,
@@ -23,9 +22,8 @@ from slamreplay.cli.batch import (
     Recipe,
     Scheduler,
     Storage,
-    read_demands,
 )
-from slamreplay.cli.options import Json
+from slamreplay.cli.options import Cause, Json
 from slamreplay.cli.terminal import complain, say_json
 from slamreplay.errors import LogError, UsageError
 
@@ -108,6 +106,7 @@ def _watch(
     from slamreplay.batch.stores import storage_options
     from slamreplay.batch.watch import Pace, Tally, served, watch
     from slamreplay.batch.whole import completeness
+    from slamreplay.recipes import read_demands
 
     who = Workers(workers, memory_limit, scheduler, log_timeout_s).checked()
     _check_apart(folder, output)
@@ -153,7 +152,9 @@ def _watch(
 
 def _check_apart(folder: str, output: Path) -> None:
     """Refuse an output within the folder: each look would go through all reports."""
-    if Path(folder).resolve() in (output.resolve(), *output.resolve().parents):
+    from slamreplay.batch.addresses import local_path
+
+    if Path(local_path(folder)).resolve() in (output.resolve(), *output.resolve().parents):
         raise UsageError("lies in the folder that is watched", where=output, hint="give another -o")
 
 
