@@ -7,6 +7,7 @@ import pytest
 from posts import S, bare_post, lost_post
 
 from slamreplay.bundle.findings import Finding
+from slamreplay.bundle.run import Estimate, Innovations
 from slamreplay.gate.gated import checked, gated, unread
 from slamreplay.gate.limit_checks import limited
 from slamreplay.gate.measures import Measure, Measures, Series
@@ -14,7 +15,7 @@ from slamreplay.gate.measuring import measures_of
 from slamreplay.gate.outcome import GateResult
 from slamreplay.gate.rules import Demands, Limit, Rules
 from slamreplay.rootcause.result import Candidate, RootCause
-from slamreplay.verdict.judgement import FailureMode
+from slamreplay.verdict.judgement import FailureMode, Interval
 
 NONE = Rules(max_severity=None)
 
@@ -112,6 +113,56 @@ def test_silence_about_what_cannot_be_looked_for_is_no_pass(bare):
     assert told["limit/error_m"].message == "no map"
     assert "no belief to judge" in told["forbid/SR-LOC-001"].message
     assert "no odometry" in told["forbid/SR-ODO-002"].message
+
+
+def test_what_was_found_all_the_same_was_found(bare):
+    found = replace(bare, findings=(Finding("SR-CON-010", "error", "collapsed"),))
+    rules = replace(NONE, expect=("SR-CON-010", "SR-CON-01*"), forbid=("SR-CON-010", "SR-CON-011"))
+
+    assert [*statuses(found, rules).values()] == ["passed", "passed", "failed", "skipped"]
+
+
+def test_a_belief_without_a_second_source_cannot_be_held_against_one(post):
+    told = of(post, replace(NONE, forbid=("SR-CON-004", "SR-CON-005")))
+
+    assert not post.consistency
+    assert {one.status for one in told.values()} == {"skipped"}
+    assert "nothing to hold the belief's errors against" in told["forbid/SR-CON-004"].message
+
+
+def test_innovations_can_be_looked_at_where_an_estimator_gave_some(post):
+    """Dead reckoning and a particle filter predict no measurement; only the latter ranks scans."""
+    rules = replace(NONE, forbid=("SR-CON-006", "SR-CON-007", "SR-CON-008", "SR-CON-009"))
+    (amcl, *_), track = post.trials, post.hindsight.track
+    one = Innovations("scan", track.t_ns[:1], np.ones((1, 1)), np.ones((1, 1, 1)), np.ones(1, bool))
+    for_a_ledger = replace(one, is_predicted=False)
+    kept = replace(amcl, run=replace(amcl.run, estimate=Estimate(track, (for_a_ledger,))))
+    predicts = replace(amcl, run=replace(amcl.run, estimate=Estimate(track, (for_a_ledger, one))))
+    ranks = {"likelihood_quantile": np.ones(len(track))}
+    tells = replace(amcl, run=replace(amcl.run, estimate=Estimate(track, diagnostics=ranks)))
+
+    def status(*trials):
+        return [*statuses(replace(post, trials=trials), rules).values()]
+
+    assert status(*post.trials) == status(kept) == ["skipped"] * 4
+    assert status(predicts) == ["passed"] * 3 + ["skipped"]
+    assert status(tells) == ["skipped"] * 3 + ["passed"]
+
+
+def test_an_expected_state_excuses_nothing_of_other_stretches(post):
+    lost = post.judgement.intervals[-1]
+    half = (lost.start_ns + lost.end_ns) // 2
+    changed = Interval("map_changed", half, lost.end_ns, findings=("SR-MAP-001",))
+    intervals = (*post.judgement.intervals[:-1], replace(lost, end_ns=half), changed)
+    both = replace(
+        post,
+        judgement=replace(post.judgement, intervals=intervals),
+        findings=(*post.findings, Finding("SR-MAP-001", "error", "an aisle changed")),
+    )
+    told = of(both, Rules(expect=("state=lost",), max_severity="warning"))["severity"]
+
+    assert told.status == "failed"
+    assert told.message == "1 finding worse than warning: SR-MAP-001 an aisle changed"
 
 
 def test_who_expects_a_state_is_told_of_a_log_that_cannot_be_judged(bare):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from slamreplay.estimators import RECORDED
 from slamreplay.evidence.result import Postmortem
 from slamreplay.gate.measures import Measures
 from slamreplay.report.assess import not_assessable
@@ -20,12 +19,15 @@ _LIKE = {
     "SR-LOC-005": "jumps",
 }
 _AGAINST_A_SOURCE = ("SR-CON-004", "SR-CON-005")
-_OF_INNOVATIONS = ("SR-CON-006", "SR-CON-007", "SR-CON-008", "SR-CON-009")
+_OF_INNOVATIONS = ("SR-CON-006", "SR-CON-007", "SR-CON-008")
 _OF_ODOMETRY = ("SR-ODO-001", "SR-ODO-002", "SR-ODO-003")
 
 
 def unasked(post: Postmortem, measures: Measures) -> dict[str, str]:
-    """Ids of findings to the reason why they could not be looked for; none that was found."""
+    """Ids of findings to the reason why they could not be looked for, all of them.
+
+    One that was found all the same was found: that comes first.
+    """
     reasons: dict[str, str] = {}
     for id_, name in _LIKE.items():
         if name in measures.missing:
@@ -34,13 +36,14 @@ def unasked(post: Postmortem, measures: Measures) -> dict[str, str]:
         reasons |= dict.fromkeys(_AGAINST_A_SOURCE, measures.missing["sigma_max_m"])
     elif not post.consistency:
         reasons |= dict.fromkeys(_AGAINST_A_SOURCE, "nothing to hold the belief's errors against")
-    if not any(t.run.trial.estimator not in RECORDED for t in post.trials):
+    estimates = [t.run.estimate for t in post.trials if t.run.estimate is not None]
+    if not any(one.is_predicted for estimate in estimates for one in estimate.innovations):
         why = "no estimator that predicts its measurements was run again"
         reasons |= dict.fromkeys(_OF_INNOVATIONS, why)
+    if not any("likelihood_quantile" in estimate.diagnostics for estimate in estimates):
+        reasons["SR-CON-009"] = "no estimator that tells how likely its scans are was run again"
     if post.odometry is None:
         reasons |= dict.fromkeys(_OF_ODOMETRY, "no odometry")
     elif post.hindsight is None:
         reasons |= dict.fromkeys(_OF_ODOMETRY, "no hindsight to hold odometry against")
-    reasons |= not_assessable(post)
-    found = {finding.id for finding in post.findings}
-    return {id_: why for id_, why in reasons.items() if id_ not in found}
+    return reasons | not_assessable(post)
