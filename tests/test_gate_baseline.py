@@ -31,7 +31,7 @@ from slamreplay.gate.baseline_difference import (
     unpaired,
 )
 from slamreplay.gate.baseline_kept import BLOCKS_MAX, block_width, blocks_of, identity_of
-from slamreplay.gate.baseline_metrics import is_worse, margin_of
+from slamreplay.gate.baseline_metrics import expected_nees, is_worse, margin_of
 from slamreplay.gate.measures import Measure, Measures, Series
 from slamreplay.gate.outcome import Outcome
 from slamreplay.gate.rules import BaselineRules
@@ -252,6 +252,22 @@ def test_numbers_that_scatter_in_proportion_are_tested_by_their_ratios():
     assert over_units(zero, new, by_ratio=True) == over_units(zero, new)
 
 
+def test_ratios_that_contradict_the_means_are_not_taken():
+    """Five runs went a little worse and one, which is all of the mean, much better."""
+    old, new = [1.0, 1.1, 0.9, 1.0, 1.05, 90.0], [1.3, 1.5, 1.2, 1.4, 1.3, 60.0]
+    assert np.mean(np.log(new) - np.log(old)) > 0.0
+    assert over_units(old, new, by_ratio=True) == over_units(old, new)
+
+
+def test_logs_that_differ_by_more_than_their_errors_count_as_so_many():
+    rng = np.random.default_rng(3)
+    means = 0.5 + rng.standard_normal(8)
+    each = [paired(np.zeros(60), m + 0.001 * remembering(rng, 60, 0.0)) for m in means]
+    ours, units = over_logs(each), over_units(np.zeros(8), [d.new for d in each])
+    assert ours.p_value == pytest.approx(units.p_value, rel=0.01)
+    assert ours.p_value > 0.01
+
+
 def test_unpaired_independent_blocks_are_nearly_welchs_test():
     rng = np.random.default_rng(7)
     old, new = rng.normal(0.0, 1.0, 100), rng.normal(0.6, 2.0, 120)
@@ -265,6 +281,37 @@ def test_independent_samples_are_those_of_the_formula(rho):
     n = 400
     found = np.median([samples_of_mean(remembering(rng, n, rho)) for _ in range(60)])
     assert found == pytest.approx(n * (1.0 - rho) / (1.0 + rho), rel=0.35)
+
+
+def samples(make):
+    rng = np.random.default_rng(1)
+    return float(np.median([samples_of_mean(make(rng)) for _ in range(40)]))
+
+
+def test_a_short_series_underrates_its_own_correlation():
+    k = np.arange(1, 40)
+    true = 40.0 / (1.0 + 2.0 * np.sum((1.0 - k / 40.0) * 0.8**k))
+    assert 0.7 * true < samples(lambda rng: remembering(rng, 40, 0.8)) <= true
+
+
+def test_a_slow_part_under_white_noise_is_seen():
+    """Neighbours say 277 of 400; a variance of 0.25 with 66 samples to one independent says 29."""
+    found = samples(lambda rng: rng.standard_normal(400) + 0.5 * remembering(rng, 400, 0.97))
+    assert 20.0 < found < 45.0
+
+
+def test_bursts_do_not_hide_how_long_a_series_hangs_together():
+    """Without them 11; sizes alone say 49."""
+
+    def made(rng):
+        return remembering(rng, 200, 0.9) * np.where(rng.random(200) < 0.1, 20.0, 1.0)
+
+    assert samples(made) < 25.0
+
+
+def test_a_cosine_takes_three_independent_samples():
+    found = mean_over_time(remembering(np.random.default_rng(1), 200, 0.3))
+    assert found.dof == int(found.n_eff / 3.0)
 
 
 def test_the_level_is_kept_where_the_textbook_cries_wolf():
@@ -436,6 +483,37 @@ def test_what_failed_before_is_of_the_log_that_it_is_held_against(tmp_path):
     assert failed_before(base, "third.mcap", [source("cd")]) == frozenset()
 
 
+def test_a_failure_is_shown_at_the_block_that_changed_most(tmp_path):
+    base = stored(tmp_path, {"a": log(blocks=0.1 + noise(1))})
+    worse = 0.2 + noise(2)
+    worse[41] += 0.3
+    worse[5] -= 0.5  # the other way
+    found = outcome(compare(base, {"a": log(blocks=worse)}, RULES), "a", "error_mean_m")
+    assert (found.status, found.start_ns, found.end_ns) == ("failed", 5 + 41 * S, 5 + 42 * S)
+
+
+def test_blocks_that_one_side_has_alone_are_told(tmp_path):
+    base = stored(tmp_path, {"a": log(blocks=0.1 + noise(1))})
+    some = 0.1 + noise(2)
+    some[:3] = np.nan
+    found = outcome(compare(base, {"a": log(blocks=some[:55])}, RULES), "a", "error_mean_m")
+    assert found.message.endswith("; 8 blocks have it on one side only")
+
+
+def test_a_log_that_was_cut_otherwise_is_not_paired(tmp_path):
+    base = stored(tmp_path, {"a": log(blocks=0.1 + noise(1))})
+    cut = replace(log(blocks=0.1 + noise(1)), start_ns=5 + S)
+    found = compare(base, {"a": cut}, RULES)
+    assert "cut otherwise" in outcome(found, "a", "log").message
+    assert not outcome(found, "a", "error_mean_m").message.startswith("no difference: the same")
+
+
+def test_the_degrees_of_freedom_of_a_nees_are_told_by_its_factor():
+    assert expected_nees({"nees_mean": 9.0, "nees_factor": 3.0**0.5}) == 3.0
+    assert expected_nees({"nees_mean": 9.0, "nees_factor": 4.5**0.5}) == 2.0
+    assert expected_nees({"nees_mean": 9.0}) is None
+
+
 def test_seeds_pair_and_a_run_that_lost_all_poses_is_worse(tmp_path):
     drawn = tuple(0.3 + 0.02 * np.arange(8))
     base = stored(tmp_path, {"a": log(seeds={"amcl.error_max_m": drawn})})
@@ -466,7 +544,9 @@ def test_p_values_are_corrected_over_all_tests_of_the_run(tmp_path):
     alone, corrected = p[7], holm(p)[7]
     message = outcome(found, "07", "error_mean_m").message
     assert f"p = {alone:.1g}" in message
-    assert "after Holm over 21 tests" in message
+    whole = over_logs([paired(old[n].over_time["error_m"], new[n].over_time["error_m"])
+                       for n in old])  # fmt: skip
+    assert f" {holm([*p, whole.p_value])[7]:.1g} after Holm over 21 tests" in message
     assert corrected > 10 * alone
 
 

@@ -1,6 +1,7 @@
 """What a gate measures of a log: numbers with names, and reasons for those that are not there."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,6 +10,8 @@ from scipy import stats
 
 from slamreplay.bundle.run import Estimate, Run, Trial
 from slamreplay.bundle.track import PoseTrack
+from slamreplay.consistency.belief.jumps.found import Jump
+from slamreplay.consistency.belief.jumps.steps import Step
 from slamreplay.consistency.evidence.nees import nees
 from slamreplay.errors import UsageError
 from slamreplay.evidence.result import TrialResult
@@ -16,6 +19,7 @@ from slamreplay.gate.measures import mean_of
 from slamreplay.gate.measuring import measures_of
 from slamreplay.gate.metrics import METRICS, OF_TRIALS, metric_of
 from slamreplay.verdict.judgement import Interval
+from slamreplay.verdict.latency.spread import Spread
 
 
 @pytest.fixture(scope="module")
@@ -94,6 +98,43 @@ def test_what_is_missing_says_what_lacks(post):
     assert (silent["error_m"], silent["sigma_m"], silent["jumps"]) == ("no localizer spoke",) * 3
     assert unsure.missing["nees"] == "no covariance of the belief that could be used"
     assert "error_m" in unsure.series
+
+
+def test_a_pose_that_was_set_is_no_jump_and_a_recovery_that_is_inferred_no_risk(post):
+    def jump(metres, **how):
+        step = Step(0, S, np.zeros(3), np.array([metres, 0.0, 0.0]), None)
+        return Jump(step, "a scan", **how)
+
+    jumps = ((Trial("b", "recorded", 0), (jump(0.4), jump(3.0, is_given=True))),)
+    (acted,) = post.judgement.actions
+    actions = (acted, replace(acted, inferred=True))
+    track = post.hindsight.track
+    told = measures_of(replace(post, jumps=jumps, odometry=track,
+                               judgement=replace(post.judgement, actions=actions)))  # fmt: skip
+
+    assert (told.values["jumps"].value, told.values["jump_max_m"].value) == (1.0, 0.4)
+    assert told.values["risky_actions"].value == 1.0
+    assert told.values["recoveries"].value == 2.0
+
+
+@pytest.mark.parametrize(("basis", "known"), [("shared", True), ("relative", False)])
+def test_ages_are_given_only_where_they_are_absolute(post, basis, known):
+    """Only what the numbers look at is here."""
+    usages = tuple(SimpleNamespace(pose=Spread(p95=p95), correction=Spread()) for p95 in (0.1, 0.3))
+    latency = SimpleNamespace(clocks=SimpleNamespace(basis=basis))
+    told = measures_of(replace(post, usages=usages, latency=latency))
+
+    if known:
+        assert told.values["pose_age_p95_s"].value == 0.3  # the worst consumer's
+        assert "no use of a pose" in told.missing["correction_age_p95_s"]
+    else:
+        assert "not of one clock" in told.missing["pose_age_p95_s"]
+
+
+def test_a_share_is_no_more_than_all():
+    shares = np.where(np.arange(60) == 30, 0.9, 1.0)
+
+    assert mean_of(shares, "", most=1.0).high == 1.0 < mean_of(shares, "").high
 
 
 def test_a_mean_has_the_interval_of_its_effective_samples():

@@ -124,7 +124,7 @@ def judged(logs: Sequence[Path], gating: Gating, output: Path | None) -> Done:
                 found.append(unread(log.as_posix(), text))
             else:
                 found.append(one)
-                # Numbers over time are judged by now, and many: of a thousand logs they fill memory.
+                # Numbers over time are judged by now; those of a thousand logs would fill memory.
                 measures[one.log] = replace(of_log, series={})
                 kept[one.log] = keep
             complain(f"{told}: {found[-1].status}")
