@@ -4,6 +4,8 @@ import json
 import os
 import subprocess
 import sys
+from contextlib import nullcontext
+from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
@@ -16,11 +18,13 @@ from slamreplay.cli import gate_run
 from slamreplay.cli.gate import gate
 from slamreplay.cli.gate_run import Gating, judged
 from slamreplay.errors import LogError, OutputError, UsageError
+from slamreplay.gate.baseline import Baseline, kept_log
 from slamreplay.gate.gated import gated
 from slamreplay.gate.measures import Measure, Measures
+from slamreplay.gate.measuring import measures_of
 from slamreplay.gate.outcome import GateResult, Outcome
 from slamreplay.gate.result_file import gate_json
-from slamreplay.gate.rules import Demands, Rules
+from slamreplay.gate.rules import Demands, Limit, Rules
 from slamreplay.ingest.options import IngestOptions
 from slamreplay.recipes import read_recipe
 
@@ -229,6 +233,23 @@ def test_a_fault_of_ours_is_told_when_all_else_is_done(monkeypatch):
     monkeypatch.setattr(gate_run, "_looked_at", lambda *_: (_ for _ in ()).throw(OutputError("x")))
     with pytest.raises(OutputError):  # the next log would find no room either
         judged([Path("a"), Path("b")], gating(), None)
+
+
+def test_a_limit_that_failed_in_the_baseline_must_be_clear(monkeypatch):
+    """Whatever the log was called then."""
+    post = lost_post()
+    monkeypatch.setattr(gate_run.options, "evidence", lambda *_, **__: nullcontext())
+    monkeypatch.setattr(gate_run, "postmortem", lambda *_, **__: post)
+    limit = Limit("error_max_m", 2.0, clear=1.0)
+    given = replace(gating(), demands=Demands("Is it?", Rules(max_severity=None, limits=(limit,))))
+    kept = kept_log(measures_of(post), post.manifest.sources, "lost")
+
+    def status(failed):
+        baseline = Baseline({"old.mcap": replace(kept, failed=failed)})
+        done = judged([Path("new.mcap")], replace(given, baseline=baseline), None)
+        return done.result.logs[0].outcomes[0].status
+
+    assert (status(()), status(("limit/error_max_m",))) == ("passed", "failed")
 
 
 def test_reports_have_folders_of_their_own():
