@@ -176,6 +176,11 @@ def test_logs_are_globs_and_everything_else_is_taken_as_it_is(job):
     assert not list(job.folder.rglob("pwned"))
 
 
+def test_a_glob_may_hold_a_blank(job):
+    assert job.judge("b c.*").returncode == 0
+    assert job.calls[0][-2:] == ["--", "b c.mcap"]
+
+
 @pytest.mark.parametrize("code", [0, 1, 2, 70])
 def test_a_gate_that_fails_goes_on_to_the_uploads(job, code):
     assert job.judge("a.mcap", ends=code).returncode == 0
