@@ -11,6 +11,7 @@ from fleets import DAY0, HOUR, commit_fleet, failed_row, log_row, place_row, ran
 from slamreplay.fleet.answering import answers
 from slamreplay.fleet.answers import DIMENSIONS
 from slamreplay.fleet.areas import worth
+from slamreplay.fleet.intervals import newcombe, z_of
 from slamreplay.fleet.queries import queries, queries_sql, views
 from slamreplay.fleet.store import commit, compact
 from slamreplay.verdict.judgement import STATES
@@ -422,3 +423,23 @@ def test_few_logs_of_a_version_tell_nothing(tmp_path, logs_before, said):
 
     assert lost.low > 0
     assert lost.verdict == said
+
+
+@pytest.mark.parametrize(("lost", "said"), [(11, "not told apart"), (20, "worse")])
+def test_the_more_is_compared_the_more_it_takes_to_be_worse(tmp_path, lost, said):
+    def logs(software, start, lost):
+        return [
+            log_row(f"{software}{k}", software=software, robot=f"r{k}", start_ns=start,
+                    state="lost" if k < lost else "healthy", gate="passed",
+                    failure_mode=f"mode {k % 8}" if k < lost else "none")
+            for k in range(40)
+        ]  # fmt: skip
+
+    commit(tmp_path, tables(logs=logs("1", DAY0, 3) + logs("2", DAY0 + HOUR, lost)))
+    found = answers(tmp_path).steps
+    one = next(step for step in found if step.measure == "lost")
+
+    assert len(found) == 4 + 8
+    assert newcombe((3 / 40, 40), (lost / 40, 40))[0] > 0  # alone it would be worse
+    assert one.verdict == said
+    assert (one.low, one.high) == newcombe((3 / 40, 40), (lost / 40, 40), z_of(12))

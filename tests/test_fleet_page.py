@@ -346,7 +346,10 @@ def test_a_worse_version_is_told_with_how_often_chance_looks_like_it(answers):
     told = headline.facts(answers)[2]
 
     assert told.alarming
-    assert "one in forty looks worse by chance" in told.detail
+    assert (
+        "By chance at most one change of version in forty looks worse; 1 was compared."
+        in told.detail
+    )
 
 
 def test_a_folder_without_logs_has_a_page(tmp_path):

@@ -176,9 +176,10 @@ def _software(steps: Sequence[Step]) -> Fact:
 
 
 def _by_chance(steps: Sequence[Step]) -> str:
-    """Many differences are looked at, and the one that is told was chosen for being worse."""
-    told = sum(min(step.was.n, step.now.n) >= LEAST_LOGS for step in steps)
-    return f"Of {told:,} differences compared, one in forty looks worse by chance."
+    """Many changes are looked at, and the one that is told was chosen for being worse."""
+    told = {(s.before, s.after) for s in steps if min(s.was.n, s.now.n) >= LEAST_LOGS}
+    compared = f"{len(told):,} {'was' if len(told) == 1 else 'were'} compared"
+    return f"By chance at most one change of version in forty looks worse; {compared}."
 
 
 def newest(steps: Sequence[Step]) -> Step:
