@@ -503,7 +503,7 @@ def test_numbers_have_two_digits(value, text):
 
 
 def test_times_and_shares_as_people_say_them():
-    times = [words.hours(h) for h in (0.01, 0.5, 2.0, 1234.0)]
+    times = [words.hours(h) for h in (0.01, 0.5, 0.9999, 2.0, 1234.0)]
 
-    assert times == ["36 s", "30 min", "2.0 h", "1,234 h"]
+    assert times == ["36 s", "30 min", "60 min", "2.0 h", "1,234 h"]
     assert [words.percent(s) for s in (None, 0.0, 0.004, 0.5)] == ["-", "0 %", "0.4 %", "50 %"]
