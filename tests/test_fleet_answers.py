@@ -6,7 +6,16 @@ from datetime import date
 import duckdb
 import numpy as np
 import pytest
-from fleets import DAY0, HOUR, commit_fleet, failed_row, log_row, place_row, random_fleet, tables
+from fleet_rows import (
+    DAY0,
+    HOUR,
+    commit_fleet,
+    failed_row,
+    log_row,
+    place_row,
+    random_fleet,
+    tables,
+)
 
 from slamreplay.fleet.answering import answers
 from slamreplay.fleet.answers import DIMENSIONS

@@ -10,8 +10,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from documents import Document
+from fleet_rows import log_row, tables
 from fleet_tables import AGED_AISLE, AISLE_M, BOX_ROWS, FIRST_DAY, NEW_SOFTWARE, fleet
-from fleets import log_row, tables
 from hypothesis import given
 from hypothesis import strategies as st
 
