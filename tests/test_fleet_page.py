@@ -340,6 +340,9 @@ def test_a_fleet_that_could_not_be_judged_is_not_told_to_be_well(tmp_path):
     assert headline.tone(found) == "insufficient_data"
     assert headline.facts(found)[0].number == "unknown"
     assert not any("No aisle" in line for line in lines.fleet_lines(found))
+    told = Document(fleet_html(view_of(found, {}))).texts("p")
+    assert told.count("Not known: no log could be judged.") == 2
+    assert not any(text.startswith("None: ") for text in told)
 
 
 def test_a_worse_version_is_told_with_how_often_chance_looks_like_it(answers):
