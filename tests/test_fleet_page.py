@@ -161,6 +161,8 @@ def test_a_sentence_of_logs_that_say_little_says_so(answers):
 
     assert told.startswith("Of 50 logs in ")
     assert " 2 were lost (29 could not be judged)" in told
+    calm = headline.sentence(replace(answers, total=total, areas=(), steps=()))
+    assert calm.endswith(" 2 were lost (29 could not be judged).")
     assert "judged" not in headline.sentence(answers)
 
 
