@@ -25,7 +25,7 @@ S = 10**9
 FIRST_DAY = date(2026, 3, 2)
 AGED_DAY, MAPPED_DAY, SOFTWARE_DAY = 4, 5, 6
 AGED_AISLE, BOX_ROWS, AISLE_ROWS = 3, (7, 11), (3, 17)
-OLD_SOFTWARE, NEW_SOFTWARE, WORSE = "2.3.1", "2.4.0", 3.0
+OLD_SOFTWARE, NEW_SOFTWARE, WORSE = "2.3.1", "2.4.0", 4.0
 NAMES = ("north", "south", "west")
 AISLES, AISLE_M, RESOLUTION_M = 6, 6.0, 0.1
 #: States by how a log went: lost, changed.
@@ -76,7 +76,7 @@ def fleet(
     visited[np.arange(n), rng.integers(AISLES, size=n)] = True
     aged = (site == 0) & (day >= AGED_DAY) & visited[:, AGED_AISLE]
     changed = aged & (rng.random(n) < 0.85)
-    p_lost = np.where((site % 3 == 2) & newer, 0.1 * WORSE, 0.1) + np.where(changed, 0.4, 0.0)
+    p_lost = np.where((site % 3 == 2) & newer, 0.1 * WORSE, 0.1) + np.where(changed, 0.8, 0.0)
     lost = rng.random(n) < p_lost
     where = np.argmax(visited * rng.random((n, AISLES)), axis=1)
     where = np.where(lost & changed, AGED_AISLE, where)

@@ -6,11 +6,22 @@ from datetime import date
 import duckdb
 import numpy as np
 import pytest
-from fleets import DAY0, HOUR, commit_fleet, failed_row, log_row, place_row, random_fleet, tables
+from fleet_rows import (
+    DAY0,
+    HOUR,
+    commit_fleet,
+    failed_row,
+    log_row,
+    place_row,
+    random_fleet,
+    tables,
+)
 
+from slamreplay.fleet import cells, snapshot
 from slamreplay.fleet.answering import answers
 from slamreplay.fleet.answers import DIMENSIONS
 from slamreplay.fleet.areas import worth
+from slamreplay.fleet.intervals import garwood, newcombe, z_of
 from slamreplay.fleet.queries import queries, queries_sql, views
 from slamreplay.fleet.store import commit, compact
 from slamreplay.verdict.judgement import STATES
@@ -183,6 +194,18 @@ def test_answers_do_not_depend_on_how_rows_came_into_parts(tmp_path):
         assert all(np.array_equal(v, getattr(b, k), equal_nan=k == "persistence")
                    if isinstance(v, np.ndarray) else v == getattr(b, k)
                    for k, v in vars(a).items())  # fmt: skip
+
+
+def test_answers_do_not_depend_on_how_many_rows_are_read_at_once(fleet, monkeypatch):
+    folder, found = fleet
+    monkeypatch.setattr(snapshot, "ROWS", 64)  # places of a log come in two reads
+    monkeypatch.setattr(cells, "_MERGE_AT", 16)
+    again = answers(folder)
+
+    assert (again.spots, again.areas, again.picks) == (found.spots, found.areas, found.picks)
+    for a, b in zip(again.maps, found.maps, strict=True):
+        np.testing.assert_array_equal(a.passed, b.passed)
+        np.testing.assert_array_equal(a.seen_m2, b.seen_m2)
 
 
 def test_a_fleet_without_logs_has_answers_about_nothing(tmp_path):
@@ -422,3 +445,44 @@ def test_few_logs_of_a_version_tell_nothing(tmp_path, logs_before, said):
 
     assert lost.low > 0
     assert lost.verdict == said
+
+
+@pytest.mark.parametrize(("lost", "said"), [(11, "not told apart"), (20, "worse")])
+def test_the_more_is_compared_the_more_it_takes_to_be_worse(tmp_path, lost, said):
+    def logs(software, start, lost):
+        return [
+            log_row(f"{software}{k}", software=software, robot=f"r{k}", start_ns=start,
+                    state="lost" if k < lost else "healthy", gate="passed",
+                    failure_mode=f"mode {k % 8}" if k < lost else "none")
+            for k in range(40)
+        ]  # fmt: skip
+
+    commit(tmp_path, tables(logs=logs("1", DAY0, 3) + logs("2", DAY0 + HOUR, lost)))
+    found = answers(tmp_path).steps
+    one = next(step for step in found if step.measure == "lost")
+
+    assert len(found) == 4 + 8
+    assert newcombe((3 / 40, 40), (lost / 40, 40))[0] > 0  # alone it would be worse
+    assert one.verdict == said
+    assert (one.low, one.high) == newcombe((3 / 40, 40), (lost / 40, 40), z_of(12))
+
+
+@pytest.mark.parametrize(("times", "spread"), [((4, 4, 4, 4, 4), 1.0), ((0, 0, 0, 0, 20), 20.0)])
+def test_rates_are_as_wide_as_robots_differ_and_of_one_robot_as_its_logs_do(
+    tmp_path, times, spread
+):
+    logs = [
+        log_row(f"{robot}{k}", robot=robot, lost_times=n if robot == "d" else 0)
+        for robot in "abcd"
+        for k, n in enumerate(times)
+    ]
+    commit(tmp_path, tables(logs=logs))
+    found = answers(tmp_path)
+    robot = found.by["robot"][3].lost_per_km
+
+    # Robots: 0, 0, 0 and 20 where 5 each were expected, (3 * 25 + 225) / 5 over 3 degrees.
+    assert (found.total.lost_per_km.low, found.total.lost_per_km.high) == pytest.approx(
+        garwood(20 / 20.0, 2.0 / 20.0)
+    )
+    # Logs of d: 4 each were expected, over 4 degrees.
+    assert (robot.low, robot.high) == pytest.approx(garwood(20 / spread, 0.5 / spread))

@@ -14,6 +14,7 @@ from slamreplay.fleet.intervals import (
     garwood,
     intraclass_correlation,
     newcombe,
+    z_of,
 )
 
 
@@ -35,6 +36,13 @@ def test_newcombe_gives_the_published_example():
     # Newcombe 1998, table II, (a): 56/70 - 48/80, method 10.
     low, high = newcombe((48 / 80, 80), (56 / 70, 70))
     assert (low, high) == pytest.approx((0.0524, 0.3339), abs=5e-5)
+
+
+@pytest.mark.parametrize("many", [1, 2, 15])
+def test_many_intervals_hold_together(many):
+    assert 2 * many * stats.norm.sf(z_of(many)) == pytest.approx(0.05)
+    found = stats.binomtest(3, 20).proportion_ci(1.0 - 0.05 / many, method="wilson")
+    assert wilson(3 / 20, 20, z_of(many)) == pytest.approx((found.low, found.high))
 
 
 def test_logs_of_robots_that_do_not_differ_count_in_full():

@@ -10,8 +10,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from documents import Document
+from fleet_rows import log_row, tables
 from fleet_tables import AGED_AISLE, AISLE_M, BOX_ROWS, FIRST_DAY, NEW_SOFTWARE, fleet
-from fleets import log_row, tables
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -161,6 +161,8 @@ def test_a_sentence_of_logs_that_say_little_says_so(answers):
 
     assert told.startswith("Of 50 logs in ")
     assert " 2 were lost (29 could not be judged)" in told
+    calm = headline.sentence(replace(answers, total=total, areas=(), steps=()))
+    assert calm.endswith(" 2 were lost (29 could not be judged).")
     assert "judged" not in headline.sentence(answers)
 
 
@@ -340,13 +342,19 @@ def test_a_fleet_that_could_not_be_judged_is_not_told_to_be_well(tmp_path):
     assert headline.tone(found) == "insufficient_data"
     assert headline.facts(found)[0].number == "unknown"
     assert not any("No aisle" in line for line in lines.fleet_lines(found))
+    told = Document(fleet_html(view_of(found, {}))).texts("p")
+    assert told.count("Not known: no log could be judged.") == 2
+    assert not any(text.startswith("None: ") for text in told)
 
 
 def test_a_worse_version_is_told_with_how_often_chance_looks_like_it(answers):
     told = headline.facts(answers)[2]
 
     assert told.alarming
-    assert "one in forty looks worse by chance" in told.detail
+    assert (
+        "By chance at most one change of version in forty looks worse; 1 was compared."
+        in told.detail
+    )
 
 
 def test_a_folder_without_logs_has_a_page(tmp_path):
@@ -500,7 +508,7 @@ def test_numbers_have_two_digits(value, text):
 
 
 def test_times_and_shares_as_people_say_them():
-    times = [words.hours(h) for h in (0.01, 0.5, 2.0, 1234.0)]
+    times = [words.hours(h) for h in (0.01, 0.5, 0.9999, 2.0, 1234.0)]
 
-    assert times == ["36 s", "30 min", "2.0 h", "1,234 h"]
+    assert times == ["36 s", "30 min", "60 min", "2.0 h", "1,234 h"]
     assert [words.percent(s) for s in (None, 0.0, 0.004, 0.5)] == ["-", "0 %", "0.4 %", "50 %"]

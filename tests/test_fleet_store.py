@@ -9,7 +9,7 @@ import duckdb
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
-from fleets import failed_row, log_row, tables
+from fleet_rows import failed_row, log_row, tables
 
 from slamreplay.errors import OutputError
 from slamreplay.fleet import compaction
@@ -202,7 +202,7 @@ def test_a_place_that_cannot_be_written_is_one_line(tmp_path):
 KILLED = """
     import os, shutil, sys
     from pathlib import Path
-    from fleets import log_row, tables
+    from fleet_rows import log_row, tables
     from pyarrow.parquet import read_table
     from slamreplay.fleet import compaction, parts
     from slamreplay.fleet.compaction import compact

@@ -280,8 +280,9 @@ class Step:
         measure: lost, changed, stopped, gate or a failure kind: share of logs.
         was: with the version before.
         now: with the one after.
-        low: of the difference now - was, Newcombe's interval from Wilson's, 95 %; None where a
-            version has no log to count.
+        low: of the difference now - was, Newcombe's interval from Wilson's; those of all measures
+            of which there are enough logs hold together with 95 %. None where a version has no log
+            to count.
         high: the same.
         sites: that ran both; nothing is compared over others.
         robots: distinct ones of both.

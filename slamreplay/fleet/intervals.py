@@ -8,24 +8,43 @@ hardly tells them.
 
 from __future__ import annotations
 
+from functools import cache
+from statistics import NormalDist
+
 import numpy as np
 from numpy.typing import NDArray
 
-from slamreplay.consistency.statistics.shares import wilson
+from slamreplay.consistency.statistics.shares import Z, wilson
 from slamreplay.geometry import se2
 
 #: Of all intervals.
 _LEVEL = 0.95
 
 
-def newcombe(was: tuple[float, float], now: tuple[float, float]) -> tuple[float, float]:
+@cache
+def z_of(many: int) -> float:
+    """Quantile of the normal distribution for `many` intervals that hold together with 95 %.
+
+    Each is missed with an equal part of the 5 % (Bonferroni; Dunn 1961).
+    """
+    return NormalDist().inv_cdf(1.0 - (1.0 - _LEVEL) / (2.0 * many))
+
+
+def newcombe(
+    was: tuple[float, float], now: tuple[float, float], z: float = Z
+) -> tuple[float, float]:
     """Interval of the difference `now` - `was` of two shares, each given with its `n`.
 
     Method 10 of Newcombe 1998, Statistics in Medicine 17, 873: square-and-add of both Wilson
     intervals.
+
+    Args:
+        was: share and number.
+        now: likewise.
+        z: quantile of the normal distribution, 95 % by default.
     """
     (p, n), (q, m) = was, now
-    (p_low, p_high), (q_low, q_high) = wilson(p, n), wilson(q, m)
+    (p_low, p_high), (q_low, q_high) = wilson(p, n, z), wilson(q, m, z)
     down, up = np.hypot(q - q_low, p_high - p), np.hypot(q_high - q, p - p_low)
     return float(q - p - down), float(q - p + up)
 

@@ -11,17 +11,25 @@ from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
 from string import Template
+from typing import get_args
 
 from slamreplay.consistency.statistics.shares import Z
 from slamreplay.fleet import areas, changed_regions, course, in_use, picks, spots
 from slamreplay.fleet.answers import DIMENSIONS, LEAST_LOGS, NEAR_M, SPOT_M
 from slamreplay.fleet.cells import AGAINST_M2, LOOK_M2, SPOT
+from slamreplay.fleet.counted import MEASURES
+from slamreplay.fleet.intervals import z_of
 from slamreplay.fleet.schema import PLACE_M, TABLES
+from slamreplay.verdict.judgement import FailureKind
 
 _WORDS = {"map_version": "map version", "software": "software version"}
 
+#: Measures of one change of version, at most: no other failure is known.
+_MOST_MEASURES = len(MEASURES) + len(get_args(FailureKind))
+
 _VALUES: dict[str, object] = {
     "Z": Z,
+    "Z_OF": [z_of(many) for many in range(1, _MOST_MEASURES + 1)],
     "SPOT": SPOT,
     "SPOT_M": SPOT_M,
     "SPOT_LOGS": spots.LEAST_LOGS,

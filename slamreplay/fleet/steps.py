@@ -8,9 +8,9 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from slamreplay.fleet.answers import Share, Step
+from slamreplay.fleet.answers import LEAST_LOGS, Share, Step
 from slamreplay.fleet.counted import MEASURES, Counted, groups
-from slamreplay.fleet.intervals import effective_pair, newcombe
+from slamreplay.fleet.intervals import effective_pair, newcombe, z_of
 from slamreplay.fleet.verdicts import Alike
 
 
@@ -19,7 +19,7 @@ def steps(logs: Counted, alike: Alike) -> tuple[Step, ...]:
 
     Only sites that ran both versions are compared: another site is another world. Within these the
     mix of sites may still differ. What is peculiar to a robot counts as far as it did not run both
-    alike. Many intervals of 95 % are read at once: one in twenty is wrong.
+    alike. All measures of a change are read at once: their intervals hold together with 95 %.
     """
     rows = {name: found for name, found in groups(logs.texts["software"]) if name is not None}
     since = {name: logs.start_ns[found[logs.ordered[found]]] for name, found in rows.items()}
@@ -41,17 +41,20 @@ def _between(
     kinds: list[str],
 ) -> Iterator[Step]:
     site = logs.texts["site"]
-    both = {*site[before[1]].tolist()} & {*site[after[1]].tolist()}
+    sites = {*site[before[1]].tolist()} & {*site[after[1]].tolist()}
     was_rows, now_rows = (
-        rows[[one in both for one in site[rows].tolist()]] for _, rows in (before, after)
+        rows[[one in sites for one in site[rows].tolist()]] for _, rows in (before, after)
     )
     robots = logs.distinct("robot", np.append(was_rows, now_rows))
-    for measure in (*MEASURES, *kinds):
-        was, now = alike.share(measure, was_rows), alike.share(measure, now_rows)
-        if measure in kinds and not was.count + now.count:
-            continue
-        low, high = _difference(logs, alike, measure, (was, was_rows), (now, now_rows))
-        yield Step(before[0], after[0], measure, was, now, low, high, len(both), robots)
+    shares = {
+        measure: (alike.share(measure, was_rows), alike.share(measure, now_rows))
+        for measure in (*MEASURES, *kinds)
+    }
+    told = {m: both for m, both in shares.items() if m in MEASURES or any(s.count for s in both)}
+    z = z_of(max(1, sum(min(s.n for s in both) >= LEAST_LOGS for both in told.values())))
+    for measure, (was, now) in told.items():
+        low, high = _difference(logs, alike, measure, (was, was_rows), (now, now_rows), z)
+        yield Step(before[0], after[0], measure, was, now, low, high, len(sites), robots)
 
 
 def _difference(
@@ -60,6 +63,7 @@ def _difference(
     measure: str,
     was: tuple[Share, NDArray[np.int64]],
     now: tuple[Share, NDArray[np.int64]],
+    z: float,
 ) -> tuple[float | None, float | None]:
     p, q = was[0].value, now[0].value
     if p is None or q is None:
@@ -67,4 +71,4 @@ def _difference(
     told, _, correlation = alike.outcome(measure)
     one, other = (logs.cluster[rows[told[rows]]] for rows in (was[1], now[1]))
     n, m = effective_pair(one, other, correlation)
-    return newcombe((p, n), (q, m))
+    return newcombe((p, n), (q, m), z)

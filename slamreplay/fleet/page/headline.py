@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from slamreplay.fleet.answers import LEAST_LOGS, Answers, Area, Step
+from slamreplay.fleet.answers import LEAST_LOGS, Answers, Area, Group, Step
 from slamreplay.fleet.page import words
 from slamreplay.fleet.page.remap import needed
 from slamreplay.verdict.words import square_metres
@@ -40,9 +40,8 @@ def sentence(answers: Answers) -> str:
     lost = total.lost.count
     how = "was" if lost == 1 else "were"
     begin = f"O{start} {lost:,} {how} lost" if lost else f"None o{start} was lost"
-    unjudged = total.logs - total.lost.n
     # Who reads "none was lost" of logs that say nothing is misled.
-    blind = f" ({unjudged:,} could not be judged)" if 2 * unjudged > total.logs else ""
+    blind = f" ({total.logs - total.lost.n:,} could not be judged)" if _is_blind(total) else ""
     explained = _explained(answers) if total.lost.n else ""  # what nobody judged tells of no map
     return f"{begin}{blind}{explained}."
 
@@ -61,19 +60,25 @@ def facts(answers: Answers) -> tuple[Fact, Fact, Fact]:
     return _areas(answers), _rate(answers), _software(answers.steps)
 
 
+def _is_blind(total: Group) -> bool:
+    """Whether most logs say nothing."""
+    return 2 * total.lost.n < total.logs
+
+
 def _explained(answers: Answers) -> str:
     """What explains most of the lost logs, an aged aisle or a version, and what else is to do."""
     areas, lost = needed(answers.areas), answers.total.lost.count
+    no_map = "" if _is_blind(answers.total) else "; no map has to be made again"
     if not lost:
-        return _to_map(areas) if areas else ", and no map has to be made again"
+        return _to_map(areas) if areas else no_map.replace(";", ", and")
     aisle = max(areas, key=lambda area: area.lost_near, default=None)
     beside = aisle.lost_near if aisle is not None else 0
     step = _lost_more(answers.steps)
     if step is not None and _beyond(step) > beside:
         told = f"; {_part(step.now.count, lost)} with software {step.after}"
-        return told + (_to_map(areas) if areas else "; no map has to be made again")
+        return told + (_to_map(areas) if areas else no_map)
     if aisle is None:
-        return "; no map has to be made again"
+        return no_map
     if beside < _TELLS * lost:
         return _to_map(areas)
     told = f"; {_part(beside, lost)} in one aisle of {_site(aisle)} whose map has aged"
@@ -176,9 +181,10 @@ def _software(steps: Sequence[Step]) -> Fact:
 
 
 def _by_chance(steps: Sequence[Step]) -> str:
-    """Many differences are looked at, and the one that is told was chosen for being worse."""
-    told = sum(min(step.was.n, step.now.n) >= LEAST_LOGS for step in steps)
-    return f"Of {told:,} differences compared, one in forty looks worse by chance."
+    """Many changes are looked at, and the one that is told was chosen for being worse."""
+    told = {(s.before, s.after) for s in steps if min(s.was.n, s.now.n) >= LEAST_LOGS}
+    compared = f"{len(told):,} {'was' if len(told) == 1 else 'were'} compared"
+    return f"By chance at most one change of version in forty looks worse; {compared}."
 
 
 def newest(steps: Sequence[Step]) -> Step:

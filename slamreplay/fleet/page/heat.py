@@ -92,6 +92,11 @@ def blocks_of(col: NDArray, row: NDArray) -> Blocks:
         size *= 2
 
 
+def shares(part: Array, whole: Array, least: float = 1.0) -> Array:
+    """(N,) part by whole; 0 where of the whole there is less than `least`."""
+    return np.divide(part, whole, out=np.zeros_like(whole), where=whole >= least)
+
+
 def heat(
     places: Blocks,
     value: Array,

@@ -5,16 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
 from slamreplay.fleet.answers import Area, MapPlaces
 from slamreplay.fleet.page import words
 from slamreplay.fleet.page.frame import Frame, around, frame_of, nice
-from slamreplay.fleet.page.heat import Shade, blocks_of, heat
+from slamreplay.fleet.page.heat import Shade, blocks_of, heat, shares
 from slamreplay.fleet.page.links import Link, Reports
 from slamreplay.fleet.page.map_image import MapImage
 from slamreplay.fleet.page.words import Box
 from slamreplay.fleet.schema import PLACE_M
+from slamreplay.fleet.words import duration
 from slamreplay.report.cells import Cell, Table, table
 from slamreplay.verdict.words import square_metres
 
@@ -95,7 +94,7 @@ def rest(areas: Sequence[Area], reports: Reports) -> Table:
             words.day(area.first_day),
             f"{area.logs:,} of {words.count(area.robots, 'robot')}",
             _still(area),
-            words.hours(area.lost_near_s / 3600.0),
+            duration(area.lost_near_s),
             _cell(reports.of(area.example)),
         )
         for area in areas
@@ -115,7 +114,7 @@ def _card(
     x0, y0, x1, y1 = area.box_m
     length = nice(frame.clip[2] / frame.metre / 8.0)
     title = f"{words.label(area.site)}, {words.place(area.box_m)}"
-    lost = words.hours(area.lost_near_s / 3600.0)
+    lost = duration(area.lost_near_s)
     facts = (
         ("since", f"{words.day(area.first_day)}, last seen {words.day(area.last_day)}"),
         ("seen by", f"{words.count(area.logs, 'log')} of {words.count(area.robots, 'robot')}"),
@@ -149,7 +148,7 @@ def _shades(places: MapPlaces | None, piece: Box) -> tuple[Shade, ...]:
     near = (x > piece[0]) & (x < piece[2]) & (y > piece[1]) & (y < piece[3])
     blocks = blocks_of(places.col[near], places.row[near])
     looks, against = blocks.greatest(places.looks[near]), blocks.greatest(places.against[near])
-    share = np.divide(against, looks, out=np.zeros_like(looks), where=looks > 0)
+    share = shares(against, looks)
     classes = [""] * (len(_LEVELS) + 1)
     return heat(blocks, share, bounds=_LEVELS, classes=classes, texts=[""] * len(share)).shades
 

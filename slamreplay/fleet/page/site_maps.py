@@ -11,10 +11,11 @@ import numpy as np
 from slamreplay.fleet.answers import MapPlaces
 from slamreplay.fleet.page import words
 from slamreplay.fleet.page.frame import Frame, frame_of
-from slamreplay.fleet.page.heat import Blocks, Heat, blocks_of, heat
+from slamreplay.fleet.page.heat import Blocks, Heat, blocks_of, heat, shares
 from slamreplay.fleet.page.map_image import MapImage
 from slamreplay.fleet.page.words import Box
 from slamreplay.fleet.schema import PLACE_M
+from slamreplay.fleet.words import duration
 from slamreplay.geometry.se2 import Array
 from slamreplay.report.cells import Table, table
 
@@ -133,12 +134,12 @@ def _panels(one: MapPlaces, places: Blocks, at: Sequence[str]) -> tuple[Panel, .
 def _traffic(places: Blocks, here: Array, at: Sequence[str]) -> Panel:
     most = float(here.max(initial=0.0))
     bounds = [most / 16, most / 8, most / 4, most / 2]
-    edges = [words.hours(s / 3600.0) for s in (*bounds, most)]
+    edges = [duration(s) for s in (*bounds, most)]
     classes = [
         f"up to {edges[0]}",
         *(f"{a} to {b}" for a, b in pairwise(edges)),
     ]
-    texts = [f"{where}: {words.hours(s / 3600.0)}" for where, s in zip(at, here, strict=True)]
+    texts = [f"{where}: {duration(s)}" for where, s in zip(at, here, strict=True)]
     return Panel(
         "here",
         "Where robots were",
@@ -149,9 +150,9 @@ def _traffic(places: Blocks, here: Array, at: Sequence[str]) -> Panel:
 
 
 def _lost(places: Blocks, here: Array, lost: Array, at: Sequence[str]) -> Panel:
-    share = np.divide(lost, here, out=np.zeros_like(lost), where=here >= LEAST_HERE_S)
+    share = shares(lost, here, LEAST_HERE_S)
     texts = [
-        f"{where}: lost {words.percent(s)} of {words.hours(h / 3600.0)}"
+        f"{where}: lost {words.percent(s)} of {duration(h)}"
         for where, s, h in zip(at, share, here, strict=True)
     ]
     return Panel(
@@ -165,7 +166,7 @@ def _lost(places: Blocks, here: Array, lost: Array, at: Sequence[str]) -> Panel:
 
 def _aged(one: MapPlaces, places: Blocks, at: Sequence[str]) -> Panel:
     looks, against = places.greatest(one.looks), places.greatest(one.against)
-    share = np.divide(against, looks, out=np.zeros_like(looks), where=looks > 0)
+    share = shares(against, looks)
     texts = [
         f"{where}: {a:.0f} of {words.count(int(n), 'log')} that looked contradict the map"
         for where, a, n in zip(at, against, looks, strict=True)
@@ -201,8 +202,8 @@ def _worst(one: MapPlaces, places: Blocks, at: Sequence[str]) -> Table:
     rows = [
         (
             at[i],
-            words.hours(here[i] / 3600.0),
-            words.hours(lost[i] / 3600.0),
+            duration(here[i]),
+            duration(lost[i]),
             f"{entered[i]:.0f}",
             f"{gone[i]:.0f} of {passed[i]:.0f}",
             f"{against[i]:.0f} of {looks[i]:.0f}",

@@ -51,6 +51,7 @@ class FleetView:
     columns_note: str
     most_a_day: int
     images: tuple[Image, ...]
+    judged: int
     remap_count: int
     cards: tuple[remap.Card, ...]
     cards_more: int
@@ -116,6 +117,7 @@ def view_of(answers: Answers, images: Mapping[str, MapImage]) -> FleetView:
         columns_note=_older(len(days)),
         most_a_day=max((sum(states.values()) for _, states in days[-_MOST_DAYS:]), default=0),
         images=tuple(Image(name, image) for name, image in named.values()),
+        judged=total.lost.n,
         remap_count=len(needed),
         cards=cards,
         cards_more=len(needed) - len(cards),

@@ -6,6 +6,7 @@ import math
 from datetime import date
 
 from slamreplay.fleet.answers import Group, Rate, Share
+from slamreplay.fleet.words import duration
 from slamreplay.report.phrases import NOT_KNOWN
 
 Box = tuple[float, float, float, float]
@@ -85,7 +86,5 @@ def two_digits(value: float) -> str:
 
 
 def hours(h: float) -> str:
-    """A time: hours, or minutes or seconds where it is short."""
-    if h >= 1.0:
-        return f"{h:,.1f} h" if h < 100.0 else f"{h:,.0f} h"
-    return f"{60.0 * h:.0f} min" if h >= 1.0 / 30.0 else f"{3600.0 * h:.0f} s"
+    """A time in hours, as `duration` says it."""
+    return duration(3600.0 * h)

@@ -41,30 +41,40 @@ with versions as (
   select * from (values (1, 'lost'), (2, 'changed'), (3, 'stopped'), (4, 'gate')) as m(place, measure)
   union all
   select distinct 5, cause from counted where judged and cause is not null
-), compared as (
+), paired as (
   select
     pairs.n, place, before, after, measures.measure,
     coalesce(was.x, 0) as was_count, coalesce(was.logs, 0) as was_logs, was.p as was,
     coalesce(now.x, 0) as now_count, coalesce(now.logs, 0) as now_logs, now.p as now,
-    now.p - was.p - sqrt(
-      (now.p - wilson_low(now.p, now.worth)) ** 2 + (wilson_high(was.p, was.worth) - was.p) ** 2
-    ) as low,
-    now.p - was.p + sqrt(
-      (wilson_high(now.p, now.worth) - now.p) ** 2 + (was.p - wilson_low(was.p, was.worth)) ** 2
-    ) as high
+    was.worth as was_worth, now.worth as now_worth,
+    least(was_logs, now_logs) >= $STEP_LOGS as enough
   from pairs cross join measures
   left join shares as was
     on was.n = pairs.n and was.measure = measures.measure and not was.is_after
   left join shares as now
     on now.n = pairs.n and now.measure = measures.measure and now.is_after
+  where place < 5 or was_count + now_count > 0
+), together as (
+  -- Of so many intervals at once each is missed less often: the list has the quantile of 1, 2, ...
+  select *, ($Z_OF)[greatest(1, count(*) filter (enough) over (partition by n))] as z
+  from paired
+), compared as (
+  select
+    *,
+    now - was - sqrt(
+      (now - wilson_low(now, now_worth, z)) ** 2 + (wilson_high(was, was_worth, z) - was) ** 2
+    ) as low,
+    now - was + sqrt(
+      (wilson_high(now, now_worth, z) - now) ** 2 + (was - wilson_low(was, was_worth, z)) ** 2
+    ) as high
+  from together
 )
 select
   before, after, measure, was_count, was_logs, was, now_count, now_logs, now, low, high,
   coalesce(sites, 0) as sites, coalesce(robots, 0) as robots,
   case
-    when least(coalesce(was_logs, 0), coalesce(now_logs, 0)) < $STEP_LOGS then 'not told apart'
+    when not enough then 'not told apart'
     when low > 0 then 'worse' when high < 0 then 'better' else 'not told apart'
   end as verdict
 from compared left join about using (n)
-where place < 5 or was_count + now_count > 0
 order by n, place, measure;

@@ -68,10 +68,10 @@ from squares;
 create or replace temp macro worth(n, squares, correlation) as
   nullif(n, 0) / (1 + correlation * (squares / nullif(n, 0) - 1));
 
--- Wilson's interval of a share, 95 %.
-create or replace temp macro wilson_half(p, n) as
-  $Z * sqrt(greatest(0, p * (1 - p) / n + $Z ** 2 / (4 * n * n)));
-create or replace temp macro wilson_low(p, n) as
-  if(p is null, null, greatest(0.0, (p + $Z ** 2 / (2 * n) - wilson_half(p, n)) / (1 + $Z ** 2 / n)));
-create or replace temp macro wilson_high(p, n) as
-  if(p is null, null, least(1.0, (p + $Z ** 2 / (2 * n) + wilson_half(p, n)) / (1 + $Z ** 2 / n)));
+-- Wilson's interval of a share, 95 % unless another quantile is given.
+create or replace temp macro wilson_half(p, n, z) as
+  z * sqrt(greatest(0, p * (1 - p) / n + z ** 2 / (4 * n * n)));
+create or replace temp macro wilson_low(p, n, z := $Z) as
+  if(p is null, null, greatest(0.0, (p + z ** 2 / (2 * n) - wilson_half(p, n, z)) / (1 + z ** 2 / n)));
+create or replace temp macro wilson_high(p, n, z := $Z) as
+  if(p is null, null, least(1.0, (p + z ** 2 / (2 * n) + wilson_half(p, n, z)) / (1 + z ** 2 / n)));
