@@ -44,6 +44,22 @@ def test_a_bag_whose_recorder_still_runs_is_not(tmp_path):
     assert is_complete(tmp_path / "a.bag").reason == "its recorder has not closed it"
 
 
+@pytest.mark.parametrize(
+    ("field", "value", "reason"),
+    [
+        (b"index_pos=", b"index_pos=" + b"\xff" * 8, "its index is not all there yet"),
+        (b"chunk_count=", b"chunk_count=" + b"\xff" * 4, "its index is not all there yet"),
+        (b"index_pos=", b"other_pos=", "its header is not whole"),
+    ],
+)
+def test_a_bag_whose_header_does_not_fit_is_not(tmp_path, field, value, reason):
+    whole = bytearray((SAMPLES / "healthy_short.bag").read_bytes())
+    at = whole.index(field)
+    whole[at : at + len(value)] = value
+    (tmp_path / "a.bag").write_bytes(whole)
+    assert is_complete(tmp_path / "a.bag").reason == reason
+
+
 def test_a_database_is_known_to_be_cut_but_not_to_be_closed(tmp_path):
     path = tmp_path / "a.db3"
     shutil.copy(SAMPLES / "healthy_short.db3", path)

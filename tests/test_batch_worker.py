@@ -1,6 +1,7 @@
 """What a worker makes of one log: the same each time, a line where it fails, and nothing left."""
 
 import json
+import sys
 from dataclasses import replace
 
 import pytest
@@ -72,6 +73,16 @@ def test_the_costs_are_those_of_a_process_that_worked(result):
     assert row["cpu_s"] > 0
     assert row["wall_s"] > 0
     assert row["peak_mb"] > 50
+
+
+def test_the_memory_is_told_where_the_system_tells_it(monkeypatch):
+    def no_proc(*_args, **_kwargs):
+        raise FileNotFoundError
+
+    monkeypatch.setattr(worker.Path, "read_text", no_proc)
+    assert 50 < worker.peak_mb() < 50_000
+    monkeypatch.setitem(sys.modules, "resource", None)  # as on Windows
+    assert worker.peak_mb() is None
 
 
 def test_how_often_a_log_was_begun_is_told_by_who_knows(result):

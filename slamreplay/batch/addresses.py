@@ -5,13 +5,15 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Iterable
+from pathlib import Path
 from urllib.parse import unquote
 
 _SCHEME = re.compile(r"([a-z][a-z0-9+.-]*)://", re.IGNORECASE)
 #: What may stand within a sentence of a library: an address, up to a blank or a quote.
 _ANY_ADDRESS = re.compile(r"[a-z][a-z0-9+.-]*://[^\s'\"<>]+", re.IGNORECASE)
 _SHORTEST_SECRET = 4
-_WEB = ("http", "https")
+#: Schemes of the web: an address there may end with a query, and folders are pages.
+WEB = ("http", "https")
 #: Azure writes container@account where others have a user.
 _CONTAINER_AT_HOST = ("abfs", "abfss")
 #: By whether it is an address of the web: names in a bucket may hold a ? or a #.
@@ -27,6 +29,16 @@ def scheme_of(place: str) -> str:
 def is_local(url: str) -> bool:
     """Whether it is a path on this machine, as LogFile has it."""
     return not scheme_of(url)
+
+
+def is_remote(place: str) -> bool:
+    """Whether it is an address that is not on this machine: no path and no `file://`."""
+    return scheme_of(place) not in ("", "file")
+
+
+def is_web(place: str) -> bool:
+    """Whether it is an address of the web."""
+    return scheme_of(place) in WEB
 
 
 def local_path(place: str) -> str:
@@ -46,7 +58,7 @@ def shown(place: str) -> str:
         host, slash, path = place.split("://", 1)[1].partition("/")
         if scheme not in _CONTAINER_AT_HOST:
             host = host.rpartition("@")[2]
-        place = f"{scheme}://" + _QUERY[scheme in _WEB].sub("", host + slash + path)
+        place = f"{scheme}://" + _QUERY[scheme in WEB].sub("", host + slash + path)
     return printable(place)
 
 
@@ -72,7 +84,7 @@ def without_secrets(text: str, secrets: Iterable[object] = ()) -> str:
 
 def name_of(place: str) -> str:
     """The last part of a path or address, without its query."""
-    if scheme_of(place) in _WEB:
+    if is_web(place):
         path = place.split("://", 1)[1].partition("/")[2]
         return unquote(_QUERY[True].sub("", path).rstrip("/").rpartition("/")[2])
     return place.rstrip("/").rpartition("/")[2]
@@ -80,13 +92,13 @@ def name_of(place: str) -> str:
 
 def absolute(path: str) -> str:
     """An absolute path; links in it stay, for they are the name the user knows."""
-    return os.path.abspath(path)  # noqa: PTH100 - pathlib keeps `..`
+    return Path(os.path.abspath(path)).as_posix()  # noqa: PTH100 - pathlib keeps `..`
 
 
 def beside(table: str, given: str | None) -> str | None:
     """What a file at `table` names: a path relative to it, or one that stands for itself."""
     if given is None or scheme_of(given) or given.startswith("/"):
         return given
-    if scheme_of(table) not in ("", "file"):
+    if is_remote(table):
         return f"{table.partition('?')[0].rpartition('/')[0]}/{given}"
     return os.path.join(os.path.dirname(local_path(table)), given)  # noqa: PTH118, PTH120

@@ -7,13 +7,10 @@ robot never closed, for a longer while.
 
 from __future__ import annotations
 
-import bz2
-import gzip
 import os
 import re
 import struct
 import zlib
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -21,18 +18,19 @@ from typing import BinaryIO, Literal
 
 import yaml
 
-from slamreplay.batch.grouping import METADATA, WAL
+from slamreplay.batch.grouping import METADATA, WAL, is_storage_name
+from slamreplay.ingest.readers import mcap_records, ros1_records, sqlite_file
+from slamreplay.ingest.readers.compression import ZSTD
+from slamreplay.ingest.readers.ros1_scan import record
+from slamreplay.ingest.text_logs.lines import BZIP2, GZIP, decompressed
 
 #: Names under which programs write what is not whole: recorders, browsers, copies, editors.
 _TEMPORARY = re.compile(
     r"^\.|~$|\.(active|part|partial|filepart|tmp|temp|crdownload|download|incomplete|swp)\Z",
     re.IGNORECASE,
 )
-_MCAP, _BAG, _SQLITE = b"\x89MCAP0\r\n", b"#ROSBAG V2.0\n", b"SQLite format 3\0"
-_GZIP, _BZIP2, _ZSTD = b"\x1f\x8b", b"BZh", b"\x28\xb5\x2f\xfd"
 #: Opcode and length of MCAP's last record, the footer, which is followed by the magic once more.
-_FOOTER = b"\x02" + struct.pack("<Q", 20)
-_BLOCK = 1 << 20
+_FOOTER = struct.pack("<BQ", mcap_records.FOOTER, 20)
 
 State = Literal["yes", "no", "unknown"]
 
@@ -82,8 +80,7 @@ def _folder(path: Path) -> Completeness:
     if unfinished:
         return Completeness("no", f"{unfinished[0]} in it has a temporary name")
     if METADATA not in entries:
-        has_storage = any(re.search(r"\.(db3|mcap)(\.zstd)?\Z", name) for name in entries)
-        if has_storage:
+        if any(map(is_storage_name, entries)):
             return Completeness("no", f"there is no {METADATA} yet")
         return Completeness("unknown", "a folder of this kind has no end")
     named = _named_files(path / METADATA)
@@ -134,59 +131,44 @@ def _by_content(path: Path, size: int, mtime_ns: int) -> Completeness:  # noqa: 
         return _EMPTY
     with path.open("rb") as stream:
         head = stream.read(100)
-        if head.startswith(_MCAP):
+        if head.startswith(mcap_records.MAGIC):
             return _mcap(stream, size)
-        if head.startswith(_BAG):
+        if head.startswith(ros1_records.MAGIC):
             return _bag(stream, size)
-        if head.startswith(_SQLITE):
+        if head.startswith(sqlite_file.MAGIC):
             return _database(head, size)
-        if head.startswith((_GZIP, _BZIP2, _ZSTD)):
-            return _packed(stream, path, head)
+        if head.startswith((GZIP, BZIP2, ZSTD)):
+            return _packed(stream, head)
     return Completeness("unknown", "a file of this kind has no end")
 
 
 def _mcap(stream: BinaryIO, size: int) -> Completeness:
-    tail = len(_FOOTER) + 20 + len(_MCAP)
-    if size < tail + len(_MCAP):
-        return Completeness("no", "it has no footer yet")
-    stream.seek(size - tail)
-    end = stream.read(tail)
-    if end.startswith(_FOOTER) and end.endswith(_MCAP):
+    stream.seek(max(size - mcap_records.TAIL, len(mcap_records.MAGIC)))
+    end = stream.read()
+    if end.startswith(_FOOTER) and end.endswith(mcap_records.MAGIC):
         return _CLOSED
     return Completeness("no", "it has no footer yet")
 
 
 def _bag(stream: BinaryIO, size: int) -> Completeness:
     """Closed where its header says where the index is, and the index ends with the file."""
-    stream.seek(len(_BAG))
-    header = dict(_fields(stream.read(4 + 4096)[4:]))
+    stream.seek(len(ros1_records.MAGIC))
     try:
-        at = struct.unpack("<Q", header[b"index_pos"])[0]
-        records = sum(struct.unpack("<I", header[n])[0] for n in (b"conn_count", b"chunk_count"))
-    except (KeyError, struct.error):
+        header, _ = record(stream, size)
+        (at,) = struct.unpack("<Q", header[b"index_pos"])
+        records = sum(ros1_records.u32(header[name]) for name in (b"conn_count", b"chunk_count"))
+    except (KeyError, ValueError, struct.error):
         return Completeness("no", "its header is not whole")
     if not at:
         return Completeness("no", "its recorder has not closed it")
-    cut = Completeness("no", "its index is not all there yet")
-    for _ in range(2 * records):  # the header of a record, its data
-        stream.seek(at)
-        length = stream.read(4)
-        if len(length) < 4:
-            return cut
-        at += 4 + struct.unpack("<I", length)[0]
-    return _CLOSED if records and at <= size else cut
-
-
-def _fields(data: bytes) -> Iterator[tuple[bytes, bytes]]:
-    """`name=value` fields of a bag's header, as far as they are whole."""
-    at = 0
-    while at + 4 <= len(data):
-        (length,) = struct.unpack_from("<I", data, at)
-        name, found, value = data[at + 4 : at + 4 + length].partition(b"=")
-        if not found or at + 4 + length > len(data):
-            return
-        yield name, value
-        at += 4 + length
+    is_whole = records > 0 and at <= size
+    try:
+        stream.seek(min(at, size))
+        for _ in range(records):
+            record(stream, size)
+    except (ValueError, struct.error):
+        is_whole = False
+    return _CLOSED if is_whole else Completeness("no", "its index is not all there yet")
 
 
 def _database(head: bytes, size: int) -> Completeness:
@@ -201,16 +183,15 @@ def _database(head: bytes, size: int) -> Completeness:
     return _DATABASE
 
 
-def _packed(stream: BinaryIO, path: Path, head: bytes) -> Completeness:
+def _packed(stream: BinaryIO, head: bytes) -> Completeness:
     """Whether a compressed stream ends, all its parts if it has more than one."""
     try:
-        if head.startswith(_ZSTD):
+        if head.startswith(ZSTD):
             is_whole = _is_whole_zstd(stream)
         else:
-            opened = gzip.open if head.startswith(_GZIP) else bz2.open
-            with opened(path) as content:
-                while content.read(_BLOCK):
-                    pass
+            stream.seek(0)
+            for _ in decompressed(stream):
+                pass
             is_whole = True
     except EOFError:
         is_whole = False
@@ -226,7 +207,7 @@ def _is_whole_zstd(stream: BinaryIO) -> bool:
     while at < size:
         stream.seek(at)
         head = stream.read(5).ljust(5, b"\0")
-        if not head.startswith(_ZSTD):
+        if not head.startswith(ZSTD):
             return at > 0  # what comes after a frame is no part of the log
         kind = head[4]
         is_single = kind >> 5 & 1

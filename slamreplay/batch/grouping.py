@@ -52,6 +52,11 @@ def is_log_name(name: str) -> bool:
     return _LOG.search(name) is not None and not name.startswith(".")
 
 
+def is_storage_name(name: str) -> bool:
+    """Whether a file of this name may be one of several that rosbag2 split a log into."""
+    return _STORAGE.search(name) is not None
+
+
 def logs_among(paths: Iterable[str]) -> list[Group]:
     """The logs that some files are, in the order of their paths.
 
@@ -95,7 +100,7 @@ def _in_folder(folder: str, members: list[str]) -> list[Group]:
     if any(_MRCLAM.match(name) for name in names):
         return [_folder_log(folder, (p for n, p in names.items() if n.endswith(".dat")))]
     logs = [name for name in names if is_log_name(name)]
-    storage = [n for n in logs if _STORAGE.search(n)]
+    storage = [n for n in logs if is_storage_name(n)]
     own = re.compile(re.escape(folder.rpartition("/")[2]) + r"_\d+" + _STORAGE.pattern)
     if storage and (METADATA in names or all(own.match(name) for name in storage)):
         parts = [n for n in (METADATA, *storage, *(s + WAL for s in storage)) if n in names]

@@ -94,11 +94,12 @@ def files_below(
             skipped(f"folders that cannot be read ({os.strerror(error.errno or 0)})")
             continue
         for entry in entries:
+            path = f"{folder.rstrip('/')}/{entry.name}"  # with / everywhere, as `logs_among` has it
             kind = "" if entry.name.startswith(".") else _kind(entry, skipped)
             if kind == "file":
-                yield entry.path
-            elif kind and reaches(tuple(entry.path[len(root) :].strip("/").split("/"))):
-                (links if kind == "link" else folders).append(entry.path)
+                yield path
+            elif kind and reaches(tuple(path[len(root) :].strip("/").split("/"))):
+                (links if kind == "link" else folders).append(path)
         links.sort()
 
 

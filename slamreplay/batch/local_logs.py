@@ -28,6 +28,7 @@ def local_logs(place: str, tell: Callable[[str], None]) -> list[LogSource]:
     """
     if not place or "\0" in place:
         raise UsageError("a place without a name" if not place else "a name with a zero byte")
+    place = place.replace(os.sep, "/")
     where = absolute(place)
     if not os.path.lexists(where) and is_pattern(place):
         folder = fixed_folder(place)

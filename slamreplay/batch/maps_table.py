@@ -7,8 +7,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
-from slamreplay.batch.addresses import beside, is_local, shown
+from slamreplay.batch.addresses import beside, shown
 from slamreplay.batch.delimited import Row, read_rows
+from slamreplay.batch.fetch import local_log
 from slamreplay.batch.patterns import Pattern, filled, pattern_of
 from slamreplay.batch.small_files import read_small
 from slamreplay.errors import UsageError
@@ -90,11 +91,8 @@ class MapsTable:
 
 def address_of(source: LogSource) -> str:
     """What patterns are held against: an absolute path, or the address as it is shown."""
-    first = source.files[0]
-    if not is_local(first.url):
-        return source.log
-    depth = len(first.name.split("/")) if source.folder else 0
-    return first.url.rsplit("/", depth)[0] if depth else first.url
+    path = local_log(source)
+    return source.log if path is None else path.as_posix()
 
 
 def read_maps_table(place: str, storage: Mapping[str, object]) -> MapsTable:

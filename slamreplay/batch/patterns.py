@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
-from slamreplay.batch.addresses import scheme_of
+from slamreplay.batch.addresses import is_web, scheme_of
 from slamreplay.errors import UsageError
 
 #: More is no pattern that somebody wrote.
@@ -72,7 +72,7 @@ class Pattern:
 
 def is_pattern(text: str) -> bool:
     """Whether a path or address holds wildcards; a `?` of http begins its query."""
-    if scheme_of(text) in ("http", "https"):
+    if is_web(text):
         text = text.replace("?", "")
     return bool(_WILDCARD.search(text))
 

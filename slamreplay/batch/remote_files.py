@@ -7,7 +7,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any
 
-from slamreplay.batch.addresses import scheme_of, shown
+from slamreplay.batch.addresses import is_web, scheme_of, shown
 from slamreplay.batch.stores import file_system, store_error
 from slamreplay.errors import LogError
 
@@ -17,7 +17,6 @@ _MAX_PAGES, _MAX_DEPTH = 10_000, 15
 _AT_ONCE = 16
 _VERSIONS = ("ETag", "etag", "generation", "md5Hash", "Content-MD5", "Digest", "Last-Modified",
              "LastModified", "last_modified", "mtime", "updated", "modified")  # fmt: skip
-_WEB = ("http", "https")
 
 
 @dataclass(frozen=True)
@@ -85,7 +84,7 @@ def remote_below(
     """
     store = file_system(root, storage)
     try:
-        if scheme_of(root) in _WEB:
+        if is_web(root):
             return _by_pages(store, root, reaches, skipped)
         more = (
             {"prefix": prefix} if prefix and scheme_of(root) in ("s3", "s3a", "gs", "gcs") else {}

@@ -6,14 +6,12 @@ from collections import Counter
 from collections.abc import Callable, Mapping
 from urllib.parse import unquote
 
-from slamreplay.batch.addresses import scheme_of, shown
+from slamreplay.batch.addresses import is_web, shown
 from slamreplay.batch.grouping import Group, logs_among
 from slamreplay.batch.patterns import Pattern, fixed_folder, fixed_text, is_pattern, pattern_of
 from slamreplay.batch.remote_files import RemoteFile, remote_below, remote_file, remote_files
 from slamreplay.batch.task import LogFile, LogSource
 from slamreplay.errors import UsageError
-
-_WEB = ("http", "https")
 
 
 def remote_logs(
@@ -60,7 +58,7 @@ def _sources(
     by_path = {path: file for file in files if "/." not in (path := shown(file.url))}
     groups = [g for g in logs_among(by_path) if pattern is None or g.fits(pattern, root)]
     wanted = [path for group in groups for path in group.members]
-    if any(scheme_of(path) in _WEB for path in wanted):
+    if any(map(is_web, wanted)):
         asked = remote_files([by_path[path].url for path in wanted], storage)
         by_path |= dict(zip(wanted, asked, strict=True))
     return [_source(group, by_path) for group in groups]
@@ -68,7 +66,7 @@ def _sources(
 
 def _source(group: Group, by_path: Mapping[str, RemoteFile]) -> LogSource:
     def plain(name: str) -> str:
-        return unquote(name) if scheme_of(group.path) in _WEB else name
+        return unquote(name) if is_web(group.path) else name
 
     files = tuple(
         LogFile(found.url, plain(group.name_of(path)), found.size, found.version)

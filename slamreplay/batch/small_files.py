@@ -6,7 +6,7 @@ import errno
 from collections.abc import Mapping
 from pathlib import Path
 
-from slamreplay.batch.addresses import local_path, scheme_of, shown
+from slamreplay.batch.addresses import is_remote, local_path, shown
 from slamreplay.batch.local_files import cannot_read
 from slamreplay.batch.stores import file_system, store_error
 from slamreplay.errors import LogError, UsageError
@@ -29,8 +29,7 @@ def read_small(place: str, storage: Mapping[str, object], *, most: int) -> bytes
         LogError: it cannot be read.
         UsageError: it is no file, or larger.
     """
-    is_remote = scheme_of(place) not in ("", "file")
-    content = _remote(place, storage, most) if is_remote else _local(place, most)
+    content = _remote(place, storage, most) if is_remote(place) else _local(place, most)
     if len(content) > most:
         raise UsageError(f"larger than {most / 1e6:g} MB", where=shown(place))
     return content

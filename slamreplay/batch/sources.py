@@ -8,7 +8,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 
-from slamreplay.batch.addresses import local_path, scheme_of, shown
+from slamreplay.batch.addresses import is_remote, local_path, scheme_of, shown
 from slamreplay.batch.local_logs import local_logs
 from slamreplay.batch.manifests import Entry, is_manifest, read_manifest
 from slamreplay.batch.maps_table import MapsTable
@@ -75,14 +75,13 @@ def _identity(source: LogSource) -> str:
 
 
 def _of_place(place: str, storage: Mapping[str, object], tell: Tell) -> list[LogSource]:
-    is_remote = scheme_of(place) not in ("", "file")
-    if is_manifest(place) and (is_remote or not Path(local_path(place)).is_dir()):
+    if is_manifest(place) and (is_remote(place) or not Path(local_path(place)).is_dir()):
         return _of_manifest(place, storage, tell)
     return _of_log(place, storage, tell)
 
 
 def _of_log(place: str, storage: Mapping[str, object], tell: Tell) -> list[LogSource]:
-    if scheme_of(place) not in ("", "file"):
+    if is_remote(place):
         return remote_logs(place, storage, tell)
     return local_logs(local_path(place), tell)
 

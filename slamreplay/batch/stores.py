@@ -7,7 +7,7 @@ import os
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from slamreplay.batch.addresses import scheme_of, shown, without_secrets
+from slamreplay.batch.addresses import WEB, scheme_of, shown, without_secrets
 from slamreplay.errors import LogError, UsageError
 
 #: How long a host may take to answer at all, and to give the next bytes, s.
@@ -75,7 +75,7 @@ def options_of(scheme: str, storage: Mapping[str, object]) -> dict[str, Any]:
         of, colon, name = key.partition(":")
         if not colon:
             found.setdefault(key, value)
-        elif of == scheme or (of, scheme) in (("http", "https"), ("s3", "s3a")):
+        elif of == scheme or (of, scheme) in (WEB, ("s3", "s3a")):
             found[name] = value
     return found
 
@@ -110,7 +110,7 @@ def _merged(scheme: str, storage: Mapping[str, object]) -> dict[str, Any]:
 
 
 def _patience(scheme: str) -> dict[str, Any]:
-    if scheme not in ("http", "https"):
+    if scheme not in WEB:
         return {}
     import aiohttp
 

@@ -247,13 +247,16 @@ def _costs(key: str, cost: Cost) -> dict[str, pa.Table]:
     return costs_row(key=key, cpu_s=cost.cpu_s, wall_s=cost.wall_s, peak_mb=peak_mb(), attempts=1)
 
 
-def peak_mb() -> float:
-    """Greatest resident memory of this process so far, MB."""
+def peak_mb() -> float | None:
+    """Greatest resident memory of this process so far, MB; None where nobody tells."""
     try:  # the figure of getrusage starts at that of the process that started this one
         status = Path("/proc/self/status").read_text(encoding="utf-8")
         return int(status.split("VmHWM:")[1].split()[0]) * 1024 / _MB
     except (OSError, IndexError):
+        pass
+    try:
         import resource
-
-        unit = 1 if sys.platform == "darwin" else 1024
-        return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit / _MB
+    except ImportError:  # Windows
+        return None
+    unit = 1 if sys.platform == "darwin" else 1024
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit / _MB

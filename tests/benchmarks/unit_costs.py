@@ -75,7 +75,7 @@ def measured(log: Path, warm: Path, folder: Path) -> dict[str, float | str]:
     start_s = time.process_time()
     found, rows = judged(log)
     commit(folder, rows)
-    return {**found, "start": start_s, "log_b": log.stat().st_size, "peak_mb": peak_mb()}
+    return {**found, "start": start_s, "log_b": log.stat().st_size, "peak_mb": peak_mb() or 0.0}
 
 
 def judged(log: Path) -> tuple[dict[str, float | str], dict[str, pa.Table]]:

@@ -8,6 +8,8 @@ from typing import Any
 
 #: A chunk that claims to be larger than this is damaged: recorders close theirs after megabytes.
 MAX_CHUNK_BYTES = 2_000_000_000
+#: First bytes of a frame of zstd (RFC 8878, section 3.1.1).
+ZSTD = b"\x28\xb5\x2f\xfd"
 _PIECE = 65536
 #: Slices of a memoryview are not copied.
 Bytes = bytes | memoryview

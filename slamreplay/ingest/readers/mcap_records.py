@@ -13,7 +13,7 @@ from slamreplay.ingest.readers.compression import Bytes
 
 MAGIC = b"\x89MCAP0\r\n"
 FOOTER, SCHEMA, CHANNEL, MESSAGE, CHUNK, MESSAGE_INDEX, CHUNK_INDEX = 2, 3, 4, 5, 6, 7, 8
-STATISTICS, DATA_END = 0x0B, 0x0F
+STATISTICS, METADATA, METADATA_INDEX, DATA_END = 0x0B, 0x0C, 0x0D, 0x0F
 #: Opcode and length before the content of every record.
 HEAD = 9
 #: Channel, sequence, log time and publish time before the payload of a message.
@@ -88,8 +88,8 @@ def is_sequence(content: Bytes) -> bool:
 def schema(data: Bytes) -> tuple[int, Schema]:
     """Id and schema. Raises ValueError, struct.error where the record is none."""
     (number,) = struct.unpack_from("<H", data)
-    name, at = _text(data, 2)
-    encoding, at = _text(data, at)
+    name, at = text(data, 2)
+    encoding, at = text(data, at)
     (length,) = struct.unpack_from("<I", data, at)
     return number, Schema(name, encoding, bytes(data[at + 4 : at + 4 + length]))
 
@@ -97,15 +97,15 @@ def schema(data: Bytes) -> tuple[int, Schema]:
 def channel(data: Bytes) -> tuple[int, Channel]:
     """Id and channel. Raises ValueError, struct.error where the record is none."""
     number, own = struct.unpack_from("<HH", data)
-    topic, at = _text(data, 4)
-    encoding, _ = _text(data, at)
+    topic, at = text(data, 4)
+    encoding, _ = text(data, at)
     return number, Channel(own, topic, encoding)
 
 
 def chunk_head(data: Bytes) -> ChunkHead:
     """Of the first bytes of a chunk. Raises ValueError, struct.error where it is none."""
     _, _, size, crc = struct.unpack_from("<QQQI", data)
-    compression, at = _text(data, 28)
+    compression, at = text(data, 28)
     (compressed,) = struct.unpack_from("<Q", data, at)
     return ChunkHead(size, crc, compression, at + 8, compressed)
 
@@ -116,7 +116,7 @@ def chunk_index(data: bytes) -> ChunkIndex:
     numbers = struct.unpack_from("<" + "HQ" * (entries // 10), data, 36)[::2]
     at = 36 + entries
     (index_length,) = struct.unpack_from("<Q", data, at)
-    _, at = _text(data, at + 8)
+    _, at = text(data, at + 8)
     _, size = struct.unpack_from("<QQ", data, at)
     channels = frozenset(int(n) for n in numbers) if index_length else None
     return ChunkIndex(start, length, index_length, size, channels)
@@ -136,7 +136,8 @@ def message_index(data: Bytes) -> tuple[int, NDArray[np.int64]]:
     return int(number), entries[1::2].astype(np.int64)
 
 
-def _text(data: Bytes, at: int) -> tuple[str, int]:
+def text(data: Bytes, at: int) -> tuple[str, int]:
+    """A text and where it ends. Raises ValueError, struct.error where there is none."""
     (length,) = struct.unpack_from("<I", data, at)
     begin = at + 4
     if begin + length > len(data):

@@ -63,7 +63,7 @@ class Contents:
 def from_summary(path: Path) -> Contents | None:
     """What the summary says; None where there is none, it is damaged, or it is not complete."""
     size = path.stat().st_size
-    summary = _summary(path, size)
+    summary = summary_of(path, size)
     contents = Contents()
     said = None
     try:
@@ -92,7 +92,7 @@ def from_summary(path: Path) -> Contents | None:
 
 def _told(path: Path, size: int) -> dict[int, int]:
     """Messages by channel as the statistics have them; none where there are no statistics."""
-    summary = _summary(path, size)
+    summary = summary_of(path, size)
     for opcode, begin, end in m.records(summary):
         if opcode == m.STATISTICS:
             try:
@@ -102,7 +102,7 @@ def _told(path: Path, size: int) -> dict[int, int]:
     return {}
 
 
-def _summary(path: Path, size: int) -> bytes:
+def summary_of(path: Path, size: int) -> bytes:
     """Records of the summary section; empty where there is none or its checksum differs."""
     with path.open("rb") as stream:
         stream.seek(max(size - m.TAIL, 0))

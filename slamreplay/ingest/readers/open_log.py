@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 from slamreplay.bundle.manifest import Loss, Source
 from slamreplay.errors import LogError
 from slamreplay.ingest.readers import mcap_file, ros1, sqlite_file
+from slamreplay.ingest.readers.compression import ZSTD
 from slamreplay.ingest.readers.reader import Block, Reader
 from slamreplay.ingest.wire.places import gather
 
-_ZSTD = b"\x28\xb5\x2f\xfd"
 _KINDS: list[tuple[bytes, str, Callable[[Path, Source], Reader]]] = [
     (ros1.MAGIC, "ros1", ros1.Ros1Reader),
     (mcap_file.MAGIC, "mcap", mcap_file.McapReader),
@@ -114,7 +114,7 @@ def _metadata(path: Path) -> dict[str, Any]:
 def _open(path: Path, digest: str, stack: ExitStack) -> Reader:
     file = path
     head = _head(path)
-    if head.startswith(_ZSTD):
+    if head.startswith(ZSTD):
         file = _decompressed(path, stack)
         head = _head(file)
     for magic, name, reader in _KINDS:
@@ -156,7 +156,7 @@ class _Decompressing:
             place = np.flatnonzero((block.end - block.start >= 4) & of_ros2[block.connection])
             heads = gather(block.data, block.start[place], 0, 4)
             is_packed = np.zeros(len(block), dtype=bool)
-            is_packed[place] = (heads == np.frombuffer(_ZSTD, dtype=np.uint8)).all(axis=1)
+            is_packed[place] = (heads == np.frombuffer(ZSTD, dtype=np.uint8)).all(axis=1)
             yield self._unpacked(block, is_packed) if is_packed.any() else block
 
     def _unpacked(self, block: Block, is_packed: NDArray[np.bool_]) -> Block:

@@ -74,7 +74,7 @@ def from_index(path: Path) -> Contents | None:
     try:
         with path.open("rb") as stream:
             stream.seek(len(r.MAGIC))
-            header, _ = _record(stream, size)
+            header, _ = record(stream, size)
             if r.opcode(header) != r.BAG:
                 return None
             (index_pos,) = struct.unpack("<Q", header[b"index_pos"])
@@ -97,7 +97,7 @@ def _read_index(contents: Contents, stream: BinaryIO, index_pos: int, size: int)
     starts = []
     stream.seek(index_pos)
     while stream.tell() < size:
-        header, data = _record(stream, size)
+        header, data = record(stream, size)
         kind = r.opcode(header)
         if kind == r.CONNECTION:
             contents.learn(header, data)
@@ -117,7 +117,7 @@ def from_scan(path: Path, damage: Damage) -> Contents:
         while at < size:
             stream.seek(at)
             try:
-                header, data = _record(stream, size)
+                header, data = record(stream, size)
                 _take(contents, header, data, at, stream.tell())
                 at = stream.tell()
                 continue
@@ -199,7 +199,12 @@ def cut_content(path: Path, at: int) -> Bytes:
         return b""
 
 
-def _record(stream: BinaryIO, size: int) -> tuple[dict[bytes, bytes], bytes]:
+def record(stream: BinaryIO, size: int) -> tuple[dict[bytes, bytes], bytes]:
+    """Header and data of the record at the stream's place, of a file of this size.
+
+    Raises:
+        ValueError, struct.error: it is broken or cut.
+    """
     return r.fields(_block(stream, size)), _block(stream, size)
 
 

@@ -14,7 +14,7 @@ from typing import BinaryIO, Protocol
 from slamreplay.bundle.manifest import Loss, Source
 from slamreplay.errors import LogError
 
-_GZIP, _BZIP2 = b"\x1f\x8b", b"BZh"
+GZIP, BZIP2 = b"\x1f\x8b", b"BZh"
 #: A decoder that finds damage keeps back what the same call had decoded, so calls are small.
 _STEP = 4096
 
@@ -49,7 +49,7 @@ def head_of(path: Path, size: int = 65_536) -> bytes:
     parts: list[bytes] = []
     try:
         with path.open("rb") as stream:
-            for part in _decompressed(stream):
+            for part in decompressed(stream):
                 parts.append(part)
                 if sum(map(len, parts)) >= size:
                     break
@@ -77,7 +77,7 @@ def read_text(path: Path, form: str) -> Text:
     parts: list[bytes] = []
     losses = []
     try:
-        parts.extend(_decompressed(BytesIO(content)))
+        parts.extend(decompressed(BytesIO(content)))
     except (OSError, EOFError, zlib.error) as error:
         good = sum(map(len, parts))
         if not good:
@@ -87,8 +87,8 @@ def read_text(path: Path, form: str) -> Text:
     return Text(b"".join(parts).replace(b"\r", b"").split(b"\n"), source, losses)
 
 
-def _decompressed(stream: BinaryIO) -> Iterator[bytes]:
-    """Text in pieces.
+def decompressed(stream: BinaryIO) -> Iterator[bytes]:
+    """The text of a stream in pieces, decompressed where its first bytes say that it is packed.
 
     Raises:
         OSError, EOFError, zlib.error: from here on it is damaged, or it ends too early.
@@ -112,6 +112,6 @@ def _decompressed(stream: BinaryIO) -> Iterator[bytes]:
 
 
 def _decoder_of(data: bytes) -> _Decoder | None:
-    if data.startswith(_GZIP):
+    if data.startswith(GZIP):
         return zlib.decompressobj(wbits=31)
-    return bz2.BZ2Decompressor() if data.startswith(_BZIP2) else None
+    return bz2.BZ2Decompressor() if data.startswith(BZIP2) else None
