@@ -179,6 +179,12 @@ def test_a_mistake_gets_one_clear_line(name, tmp_path):
     assert len(line) < len(str(tmp_path)) + 400
 
 
+def test_a_margin_of_nothing_known_does_not_list_everything(tmp_path):
+    with pytest.raises(UsageError, match="follows baseline/") as caught:
+        read(GATE.replace("amcl.error_max_m: 0.1", "ax_m: 0.1"), tmp_path)
+    assert len(str(caught.value)) < len(str(tmp_path)) + 200
+
+
 @settings(max_examples=100, deadline=None)
 @given(
     st.lists(

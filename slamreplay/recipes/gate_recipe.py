@@ -166,9 +166,10 @@ def _demands(rules: Rules) -> bool:
 def _check_compared(name: str, estimators: tuple[str, ...]) -> None:
     names = compared(estimators)
     if name not in names:
-        raise UsageError(
-            f"{name[:80]!r} is not compared with a baseline", hint=nearest(name, names)
-        )
+        hint = nearest(name, names)
+        if len(hint) > 300:  # of every estimator there are a dozen
+            hint = "it is what follows baseline/ in the checks of a run with --baseline"
+        raise UsageError(f"{name[:80]!r} is not compared with a baseline", hint=hint)
 
 
 def _check_asked(texts: tuple[str, ...]) -> None:
