@@ -18,13 +18,15 @@ from hypothesis import strategies as st
 from slamreplay.fleet.answering import answers as answers_of
 from slamreplay.fleet.answers import Copies, Failure, Share
 from slamreplay.fleet.layout import map_folder
-from slamreplay.fleet.page import headline, lines, remap, words
+from slamreplay.fleet.page import headline, lines, logs, remap, words
 from slamreplay.fleet.page.bars import columns, pieces
 from slamreplay.fleet.page.frame import around, frame_of, nice, ticks
+from slamreplay.fleet.page.groups import step_table
 from slamreplay.fleet.page.heat import blocks_of, heat
 from slamreplay.fleet.page.html import fleet_html
+from slamreplay.fleet.page.links import Reports
 from slamreplay.fleet.page.map_image import map_image
-from slamreplay.fleet.page.site_maps import MOST_MAPS
+from slamreplay.fleet.page.site_maps import MOST_MAPS, site_maps
 from slamreplay.fleet.page.view import view_of
 from slamreplay.fleet.page.writer import write_fleet_page
 from slamreplay.fleet.queries import queries, views
@@ -231,6 +233,31 @@ def test_logs_worth_looking_at_lead_to_the_moment_of_their_trouble(answers, page
 
     assert f"{pick.report}/report.html#t={at_s:.2f}".rstrip("0").rstrip(".") in hrefs
     assert all(re.fullmatch(r"logs/[\w%.-]+/report\.html(#t=[\d.]+)?", href) for href in hrefs)
+
+
+def test_logs_of_one_kind_at_one_site_do_not_fill_the_list(answers):
+    pick = answers.picks[0]
+    many = [replace(pick, site=site, key=f"{site}{k}") for k in range(9) for site in "ab"]
+    shown = logs.picks(many, Reports(answers))
+
+    assert [row.where[0] for row in shown] == ["a", "b"] * logs.MOST_ALIKE
+
+
+def test_what_got_worse_stands_first(answers):
+    verdicts = [row[5].text for row in step_table(answers.steps[::-1]).rows]
+
+    assert "worse" in verdicts
+    assert verdicts == sorted(verdicts, key=["worse", "better", "not told apart"].index)
+
+
+def test_a_moment_at_a_place_says_nothing_of_how_often_robots_are_lost_there(answers):
+    one = answers.maps[0]
+    brief = replace(one, here_s=np.full(len(one.col), 4.0), lost_s=np.full(len(one.col), 4.0))
+    (drawn,) = site_maps([brief], {})
+    panels = {panel.kind: panel.heat.spots for panel in drawn.panels}
+
+    assert panels["here"]
+    assert not panels["lost"]
 
 
 def test_failed_logs_stand_with_their_lines_and_copies_with_their_names(answers, page):
