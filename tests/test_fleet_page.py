@@ -26,7 +26,7 @@ from slamreplay.fleet.page.heat import blocks_of, heat
 from slamreplay.fleet.page.html import fleet_html
 from slamreplay.fleet.page.links import Reports
 from slamreplay.fleet.page.map_image import map_image
-from slamreplay.fleet.page.site_maps import MOST_MAPS, site_maps
+from slamreplay.fleet.page.site_maps import MOST_MAPS, by_trouble, site_maps
 from slamreplay.fleet.page.view import view_of
 from slamreplay.fleet.page.writer import write_fleet_page
 from slamreplay.fleet.queries import queries, views
@@ -258,6 +258,23 @@ def test_a_moment_at_a_place_says_nothing_of_how_often_robots_are_lost_there(ans
 
     assert panels["here"]
     assert not panels["lost"]
+
+
+def test_maps_out_of_use_come_after_those_in_use(answers):
+    one = answers.maps[0]
+    worse = replace(one, in_use=False, lost_s=one.lost_s + 100.0)
+
+    assert by_trouble([worse, one]) == (one, worse)
+
+
+def test_how_much_alike_logs_are_is_told_where_it_matters(answers):
+    told = [
+        " ".join(Document(fleet_html(view_of(replace(answers, alike=alike), {}))).texts("p"))
+        for alike in (1.0, 2.34)
+    ]
+
+    assert "are alike" not in told[0]
+    assert "Logs of one robot are alike: 2.3 of them are worth one." in told[1]
 
 
 def test_failed_logs_stand_with_their_lines_and_copies_with_their_names(answers, page):
