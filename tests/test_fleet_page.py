@@ -195,6 +195,20 @@ def test_the_aisle_that_has_aged_is_the_one_to_be_mapped_again(answers, page):
     assert f"{area.logs} logs of {area.robots} robots" in cards[0]
 
 
+def test_a_card_frames_its_area_and_shades_its_piece_of_the_map_alone(answers):
+    needed = remap.needed(answers.areas)
+    (area,), (map_,) = needed, [one for one in answers.maps if one.site == needed[0].site]
+    far = replace(map_, against=map_.looks)  # all of the map is contradicted
+    (card,) = remap.cards([area], [far], {}, Reports(answers))
+    x0, y0, x1, y1 = area.box_m
+    starts = [float(x) for shade in card.shades for x in re.findall(r"M([-\d.]+) ", shade.path)]
+    piece_m = card.frame.clip[2] / card.frame.metre
+
+    assert card.box == (x0, y0, x1 - x0, y1 - y0)
+    assert starts
+    assert max(starts) - min(starts) <= piece_m < np.ptp(map_.col)
+
+
 @pytest.mark.parametrize(
     ("what", "noun"),
     [("robot", "robot"), ("site", "site"), ("software", "software version"), ("day", "day")],
