@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
@@ -18,6 +18,7 @@ from slamreplay.fleet.intervals import (
 )
 
 
+@settings(deadline=None)
 @given(st.integers(1, 500).flatmap(lambda n: st.tuples(st.integers(0, n), st.just(n))))
 def test_wilson_is_scipys(counts):
     x, n = counts
@@ -25,6 +26,7 @@ def test_wilson_is_scipys(counts):
     assert wilson(x / n, n) == pytest.approx((expected.low, expected.high), abs=1e-9)
 
 
+@settings(deadline=None)
 @given(st.integers(0, 300), st.floats(0.01, 1000.0))
 def test_garwood_is_by_quantiles_of_chi_squared(x, exposure):
     low = stats.chi2.ppf(0.025, 2 * x) / 2 if x else 0.0

@@ -18,13 +18,15 @@ from hypothesis import strategies as st
 from slamreplay.fleet.answering import answers as answers_of
 from slamreplay.fleet.answers import Copies, Failure, Share
 from slamreplay.fleet.layout import map_folder
-from slamreplay.fleet.page import headline, lines, remap, words
+from slamreplay.fleet.page import headline, lines, logs, remap, words
 from slamreplay.fleet.page.bars import columns, pieces
 from slamreplay.fleet.page.frame import around, frame_of, nice, ticks
+from slamreplay.fleet.page.groups import step_table
 from slamreplay.fleet.page.heat import blocks_of, heat
 from slamreplay.fleet.page.html import fleet_html
+from slamreplay.fleet.page.links import Reports
 from slamreplay.fleet.page.map_image import map_image
-from slamreplay.fleet.page.site_maps import MOST_MAPS
+from slamreplay.fleet.page.site_maps import MOST_MAPS, by_trouble, site_maps
 from slamreplay.fleet.page.view import view_of
 from slamreplay.fleet.page.writer import write_fleet_page
 from slamreplay.fleet.queries import queries, views
@@ -193,6 +195,20 @@ def test_the_aisle_that_has_aged_is_the_one_to_be_mapped_again(answers, page):
     assert f"{area.logs} logs of {area.robots} robots" in cards[0]
 
 
+def test_a_card_frames_its_area_and_shades_its_piece_of_the_map_alone(answers):
+    needed = remap.needed(answers.areas)
+    (area,), (map_,) = needed, [one for one in answers.maps if one.site == needed[0].site]
+    far = replace(map_, against=map_.looks)  # all of the map is contradicted
+    (card,) = remap.cards([area], [far], {}, Reports(answers))
+    x0, y0, x1, y1 = area.box_m
+    starts = [float(x) for shade in card.shades for x in re.findall(r"M([-\d.]+) ", shade.path)]
+    piece_m = card.frame.clip[2] / card.frame.metre
+
+    assert card.box == (x0, y0, x1 - x0, y1 - y0)
+    assert starts
+    assert max(starts) - min(starts) <= piece_m < np.ptp(map_.col)
+
+
 @pytest.mark.parametrize(
     ("what", "noun"),
     [("robot", "robot"), ("site", "site"), ("software", "software version"), ("day", "day")],
@@ -231,6 +247,48 @@ def test_logs_worth_looking_at_lead_to_the_moment_of_their_trouble(answers, page
 
     assert f"{pick.report}/report.html#t={at_s:.2f}".rstrip("0").rstrip(".") in hrefs
     assert all(re.fullmatch(r"logs/[\w%.-]+/report\.html(#t=[\d.]+)?", href) for href in hrefs)
+
+
+def test_logs_of_one_kind_at_one_site_do_not_fill_the_list(answers):
+    pick = answers.picks[0]
+    many = [replace(pick, site=site, key=f"{site}{k}") for k in range(9) for site in "ab"]
+    shown = logs.picks(many, Reports(answers))
+
+    assert [row.where[0] for row in shown] == ["a", "b"] * logs.MOST_ALIKE
+
+
+def test_what_got_worse_stands_first(answers):
+    verdicts = [row[5].text for row in step_table(answers.steps[::-1]).rows]
+
+    assert "worse" in verdicts
+    assert verdicts == sorted(verdicts, key=["worse", "better", "not told apart"].index)
+
+
+def test_a_moment_at_a_place_says_nothing_of_how_often_robots_are_lost_there(answers):
+    one = answers.maps[0]
+    brief = replace(one, here_s=np.full(len(one.col), 4.0), lost_s=np.full(len(one.col), 4.0))
+    (drawn,) = site_maps([brief], {})
+    panels = {panel.kind: panel.heat.spots for panel in drawn.panels}
+
+    assert panels["here"]
+    assert not panels["lost"]
+
+
+def test_maps_out_of_use_come_after_those_in_use(answers):
+    one = answers.maps[0]
+    worse = replace(one, in_use=False, lost_s=one.lost_s + 100.0)
+
+    assert by_trouble([worse, one]) == (one, worse)
+
+
+def test_how_much_alike_logs_are_is_told_where_it_matters(answers):
+    told = [
+        " ".join(Document(fleet_html(view_of(replace(answers, alike=alike), {}))).texts("p"))
+        for alike in (1.0, 2.34)
+    ]
+
+    assert "are alike" not in told[0]
+    assert "Logs of one robot are alike: 2.3 of them are worth one." in told[1]
 
 
 def test_failed_logs_stand_with_their_lines_and_copies_with_their_names(answers, page):

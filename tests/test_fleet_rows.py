@@ -170,6 +170,25 @@ def test_cells_of_the_map_are_counted_by_their_area_in_the_frame_of_the_map(post
     }
 
 
+def test_a_map_that_held_twice_was_looked_at_once(post):
+    fresh = Freshness(
+        np.full((20, 20), 5), np.full((20, 20), NEVER), 0.1, np.array([3.0, 7.0, 0.0]), 10
+    )
+    still = _walk(post, np.full((200, 2), 0.5))
+    changes = replace(still.hindsight.changes, freshness=fresh)
+    found = replace(still.hindsight, changes=changes)
+    middle, end = START_NS + 10 * S, START_NS + 20 * S
+    halves = tuple(
+        Part(MapStretch((Held("sha256:a", *span),)), found)
+        for span in ((START_NS, middle), (middle, end))
+    )
+    one = places_of(replace(still, hindsight=found))
+    two = places_of(replace(still, hindsight=replace(found, parts=halves)))
+    assert one["seen_m2"].max() == 1.0
+    for name in ("col", "row", "seen_m2", "here_s"):
+        np.testing.assert_array_equal(one[name], two[name])
+
+
 def test_sums_are_exact_in_any_order(post):
     places = places_of(_walk(post, np.random.default_rng(1).uniform(0, 4, (200, 2)), 0.0987))
     values = places["here_s"]

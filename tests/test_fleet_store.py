@@ -12,7 +12,7 @@ import pytest
 from fleet_rows import failed_row, log_row, tables
 
 from slamreplay.errors import OutputError
-from slamreplay.fleet import compaction
+from slamreplay.fleet import compaction, snapshot
 from slamreplay.fleet.compaction import compact
 from slamreplay.fleet.damage import mend
 from slamreplay.fleet.parts import parts_in
@@ -114,6 +114,34 @@ def test_rows_laid_together_do_not_outrank_newer_ones_in_a_part_between(tmp_path
     compact(tmp_path)
     assert read(tmp_path, "logs")["state"].to_pylist() == ["healthy"] * 5
     assert len(_globbed(tmp_path)) == 5
+
+
+def test_rows_laid_together_across_a_part_between_count_before_it(tmp_path, monkeypatch):
+    monkeypatch.setattr(compaction, "MOST_LOGS", 3)
+    commit(tmp_path, tables(logs=[log_row("e")]))
+    commit(tmp_path, tables(logs=[log_row(k, state="lost") for k in "abcd"]))
+    commit(tmp_path, tables(logs=[log_row("a")]))
+    monkeypatch.setattr(compaction, "_shares", lambda parts: [[parts[0][0], parts[-1][0]]])
+    compact(tmp_path)
+    assert len(parts_in(tmp_path)) == 2
+    assert read(tmp_path, "logs")["state"].to_pylist() == ["healthy", *["lost"] * 3, "healthy"]
+
+
+def test_a_part_that_goes_while_it_is_looked_at_is_no_damage(tmp_path, monkeypatch):
+    _add(tmp_path, "a")
+    _add(tmp_path, "b")
+    check, gone = snapshot.check_part, []
+
+    def vanishing(part):
+        if not gone:
+            gone.append(part)
+            compact(tmp_path)
+        check(part)
+
+    monkeypatch.setattr(snapshot, "check_part", vanishing)
+    told = []
+    assert read(tmp_path, "logs", told.append)["key"].to_pylist() == ["a", "b"]
+    assert told == []
 
 
 def test_a_part_that_was_cut_is_told_and_left_out_and_set_aside(tmp_path):

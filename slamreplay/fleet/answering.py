@@ -50,7 +50,7 @@ def _answers(now: Snapshot, logs: Counted, lines: list[str]) -> Answers:
         areas=areas(now, logs, found, seen, in_use),
         picks=picks(logs, found),
         steps=steps(logs, alike),
-        maps=map_places(logs, found, seen, in_use),
+        maps=map_places(logs, found, in_use),
         copies=logs.copies,
         failures=failures(logs),
         troubles_s=troubles_s(now, logs),

@@ -328,8 +328,6 @@ class MapPlaces:
         seen_m2: of the map that beams checked, greatest over logs.
         looks: logs with a verdict, and a clock, that looked there.
         against: of them, those that contradict the map there.
-        persistence: of looks after the first that contradicts, the share that does, too; NaN where
-            none contradicts or nobody came back.
     """
 
     site: str | None
@@ -349,7 +347,6 @@ class MapPlaces:
     seen_m2: se2.Array
     looks: NDArray[np.int64]
     against: NDArray[np.int64]
-    persistence: se2.Array
 
 
 @dataclass(frozen=True)

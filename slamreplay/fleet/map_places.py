@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from slamreplay.fleet.answers import MapPlaces
-from slamreplay.fleet.areas import Looks
 from slamreplay.fleet.cells import split
 from slamreplay.fleet.counted import Counted
 from slamreplay.fleet.gathered import (
@@ -19,13 +18,10 @@ from slamreplay.fleet.gathered import (
     Gathered,
 )
 from slamreplay.fleet.in_use import InUse
-from slamreplay.geometry import se2
 
 
-def map_places(logs: Counted, found: Gathered, seen: Looks, in_use: InUse) -> tuple[MapPlaces, ...]:
+def map_places(logs: Counted, found: Gathered, in_use: InUse) -> tuple[MapPlaces, ...]:
     """One per site and map version, those in use first, most logs first."""
-    persistence = np.full(len(found.places.code), np.nan)
-    persistence[np.searchsorted(found.places.code, seen.codes)] = _persistence(seen)
     by_map: dict[tuple[str | None, str | None], list[int]] = {}
     pairs = zip(logs.texts["site"].tolist(), logs.texts["map_version"].tolist(), strict=True)
     for k, pair in enumerate(pairs):
@@ -57,20 +53,7 @@ def map_places(logs: Counted, found: Gathered, seen: Looks, in_use: InUse) -> tu
                 seen_m2=found.places.greatest[rows],
                 looks=whole[:, LOOKS],
                 against=whole[:, AGAINST],
-                persistence=persistence[rows],
             )
         )
     key = lambda m: (not m.in_use, -m.logs, m.site is None, m.site or "", m.map_version)  # noqa: E731
     return tuple(sorted(answers, key=key))
-
-
-def _persistence(seen: Looks) -> se2.Array:
-    """(P,) of the looks after the first that contradicts, the share that does, too."""
-    count = len(seen.codes)
-    row = np.arange(len(seen.place))
-    first = np.full(count, len(row))
-    np.minimum.at(first, seen.place[seen.against], row[seen.against])
-    later = row > first[seen.place]
-    visits = np.bincount(seen.place[later], minlength=count)
-    still = np.bincount(seen.place[later & seen.against], minlength=count)
-    return np.divide(still, visits, out=np.full(count, np.nan), where=visits > 0)
