@@ -60,6 +60,21 @@ def test_a_bag_whose_header_does_not_fit_is_not(tmp_path, field, value, reason):
     assert is_complete(tmp_path / "a.bag").reason == reason
 
 
+def test_a_closed_bag_tells_of_what_it_holds(tmp_path):
+    whole = (SAMPLES / "healthy_short.bag").read_bytes()
+    for field in (b"conn_count=", b"chunk_count="):
+        at = whole.index(field) + len(field)
+        whole = whole[:at] + bytes(4) + whole[at + 4 :]
+    (tmp_path / "a.bag").write_bytes(whole)
+    assert is_complete(tmp_path / "a.bag").reason == "its index is not all there yet"
+
+
+def test_the_magic_alone_does_not_close_an_mcap_file(tmp_path):
+    magic = b"\x89MCAP0\r\n"
+    (tmp_path / "a.mcap").write_bytes(magic + bytes(100) + magic)
+    assert state(tmp_path / "a.mcap") == "no"
+
+
 def test_a_database_is_known_to_be_cut_but_not_to_be_closed(tmp_path):
     path = tmp_path / "a.db3"
     shutil.copy(SAMPLES / "healthy_short.db3", path)

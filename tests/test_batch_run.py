@@ -49,6 +49,15 @@ def worked(monkeypatch):
     return names
 
 
+def test_a_map_that_is_there_is_not_written_again(worked, tmp_path):
+    run_batch([task("a")], tmp_path / "b", Workers())
+    (there,) = (tmp_path / "b" / "maps").glob("*/map.yaml")
+    before = there.stat().st_ino, there.stat().st_mtime_ns
+    run_batch([task("lost")], tmp_path / "b", Workers())
+
+    assert (there.stat().st_ino, there.stat().st_mtime_ns) == before
+
+
 def test_the_same_again_does_nothing_and_tells_the_same(worked, tmp_path):
     tasks = [task("a"), task("torn"), task("lost")]
     first = run_batch(tasks, tmp_path / "b", Workers())

@@ -15,12 +15,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import slamreplay.batch.watch as watched
+from slamreplay.batch.complete import Completeness
 from slamreplay.batch.keys import task_of
+from slamreplay.batch.put_off import is_passing
 from slamreplay.batch.settling import Patience, Settling
 from slamreplay.batch.sources import NoLogError, sources_of
 from slamreplay.batch.stores import store_error
 from slamreplay.batch.task import LogResult
-from slamreplay.batch.watch import Pace, Tally, is_passing, watch
+from slamreplay.batch.watch import Pace, Tally, watch
 from slamreplay.batch.whole import completeness
 from slamreplay.errors import LogError, OutputError
 from slamreplay.fleet.schema import arrow_schema
@@ -302,6 +304,21 @@ def test_what_nobody_closed_is_told_once_and_taken_after_a_while(bench):
     assert bench.names() == ["a.mcap"]
 
 
+@pytest.mark.parametrize("state", ["yes", "unknown", "no"])
+def test_an_old_date_on_a_file_that_just_came_makes_it_no_older(bench, state):
+    bench.write("a.clf", b"x")()  # as a copy keeps the date of what it copies
+    os.utime(bench.folder / "a.clf", (100, 100))
+    settling = Settling(
+        Patience(settle_s=10.0), lambda _source: Completeness(state, "so it says"),
+        now_s=lambda: bench.now_s, wall_s=lambda: 1e9,
+    )  # fmt: skip
+
+    looked = settling.look(bench.find())
+    assert (looked.ready, looked.lacking, looked.moving) == ((), {}, 1)
+    bench.now_s += 10.0
+    assert settling.look(bench.find()).ready
+
+
 def test_a_watch_that_is_started_anew_need_not_wait_as_long_again(bench):
     bench.patience = Patience(settle_s=10.0, give_up_s=3600.0)
     bench.write("a.mcap", mcap()[:-30])()
@@ -430,6 +447,15 @@ def test_a_log_that_is_written_to_while_it_is_read_is_done_when_it_stands_still(
     assert bench.told == [
         f"{bench.folder / 'a.mcap'}: changed while it was read, so it waits again"
     ]
+
+
+def test_a_log_that_was_gone_before_it_was_read_has_not_failed(bench):
+    bench.error_of = {"a.mcap": "a.mcap: cannot read: No such file or directory"}
+    bench.while_reading = {"a.mcap": lambda: (bench.folder / "a.mcap").unlink()}
+    bench.steps = [bench.write("a.mcap", mcap()), *WAIT]
+    bench.run()
+
+    assert (bench.names(), bench.rows(), bench.tally.failed) == (["a.mcap"], [], 0)
 
 
 def test_a_log_that_was_read_and_then_filed_away_is_kept(bench):

@@ -50,6 +50,22 @@ def test_many_deaths_in_company_do_not_condemn():
     assert work.died(key)
 
 
+def test_a_suspect_that_is_given_back_goes_out_alone_again():
+    work = Work(tasks(2))
+    killer, other = sent(work, 1)
+    work.died(killer)
+    work.died(other)
+    assert sent(work, 1) == [killer]
+
+    work.give_back()
+    assert sent(work, 1) == [killer]
+    assert not work.died(killer)
+    assert sent(work, 1) == [other]
+    work.done(other)
+    assert sent(work, 1) == [killer]
+    assert work.died(killer)
+
+
 def test_suspects_wait_for_the_others():
     work = Work(tasks(3))
     first, second = sent(work, 1)

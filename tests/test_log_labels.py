@@ -51,6 +51,12 @@ def test_a_ros1_bag_holds_none(tmp_path):
     assert log_labels(SAMPLES / "healthy_short.bag") == {}
 
 
+def test_what_holds_no_labels_is_told_before_the_work(tmp_path, monkeypatch):
+    monkeypatch.setattr(pipeline, "record", None)
+    with pytest.raises(OutputError, match="holds no labels"):
+        pipeline.simulate("healthy", tmp_path / "a.bag", labels=LABELS)
+
+
 def _mcap(path, records, *, finish=True, chunks=3):
     from mcap.writer import Writer
 
@@ -92,6 +98,16 @@ def test_a_log_that_was_cut_is_passed_over_by_its_heads(tmp_path):
     for cut in range(0, len(content), 7):
         path.write_bytes(content[:cut])
         assert log_labels(path) in ({}, {"site": "n"})
+
+
+def test_an_index_that_leads_nowhere_costs_no_other_record(tmp_path):
+    path = _mcap(tmp_path / "a.mcap", [("first", {"site": "n"}), ("info", {"robot": "7"})])
+    content = path.read_bytes()
+    at = content.index(b"\x0d" + (16 + 4 + len("first")).to_bytes(8, "little")) + 9
+    content = content[:at] + b"\xff" * 8 + content[at + 8 :]
+    content = content[:-12] + bytes(4) + content[-8:]  # no checksum, which would tell
+    path.write_bytes(content)
+    assert log_labels(path) == {"robot": "7"}
 
 
 def test_a_closed_log_costs_few_reads_whatever_its_size(tmp_path, monkeypatch):

@@ -3,14 +3,10 @@
 It looks at intervals and depends on no notices of a file system, which a share or an object store
 does not send. Nothing is kept in memory alone: what is done stands in the batch's folder, so that a
 watch that was killed goes on, as a batch does, with what is missing.
-
-It is long because a round is one story, with what is waited for, put off and told once.
 """
 
 from __future__ import annotations
 
-import errno
-import os
 import time
 from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import AbstractContextManager, closing, contextmanager
@@ -19,8 +15,10 @@ from pathlib import Path
 
 from slamreplay.batch.cluster import Workers, kept_connected
 from slamreplay.batch.commit import commit_result, fates
+from slamreplay.batch.finished import Finished, finished_of
 from slamreplay.batch.folder import batch_folder
 from slamreplay.batch.loop import looked_back
+from slamreplay.batch.put_off import PutOff, is_passing
 from slamreplay.batch.relabel import relabel
 from slamreplay.batch.settling import Looked, Settling, is_there
 from slamreplay.batch.stopping import check_stopped
@@ -30,20 +28,6 @@ from slamreplay.errors import OutputError, SlamreplayError
 
 #: The results of tasks, as `loop.looked_back` gives them.
 LookBack = Callable[[Sequence[LogTask]], Generator[LogResult]]
-
-#: What lines of failed logs say where the machine or a store lacks something and not the log.
-_PASSING = (
-    *map(os.strerror, (
-        errno.ENOSPC, errno.EDQUOT, errno.ESTALE, errno.EIO, errno.ENOTCONN, errno.ETIMEDOUT,
-        errno.EHOSTUNREACH, errno.ENETUNREACH, errno.ECONNREFUSED, errno.ECONNRESET, errno.EMFILE,
-    )),
-    # of stores.store_error
-    "does not answer", "the server answers", "no room to copy it to", "access denied",
-    "there are no credentials for it",
-)  # fmt: skip
-_PUT_OFF = "put off "
-#: The longest time between two trials of such a log, s.
-_LONGEST_S = 3600.0
 
 
 @dataclass(frozen=True)
@@ -60,29 +44,6 @@ class Pace:
     every_s: float = 30.0
     per_round: int = 32
     is_once: bool = False
-
-
-@dataclass(frozen=True)
-class Finished:
-    """A log whose rows and report are kept.
-
-    Attributes:
-        log: its path or address.
-        key: of the log and how it was read.
-        state: of its verdict; None of one that failed.
-        summary: the verdict in one sentence, or why it failed.
-        gate: passed, failed or skipped; None without a gate, and of one that failed.
-        report: folder of its report, None of one that failed.
-        has_failed: whether it could not be judged.
-    """
-
-    log: str
-    key: str
-    state: str | None
-    summary: str
-    gate: str | None
-    report: Path | None
-    has_failed: bool
 
 
 @dataclass
@@ -143,7 +104,7 @@ def watch(
     with batch_folder(target) as scratch, serve(scratch) as look_back:
         rounds = _Rounds(
             target, settling, task_of, look_back, pace, tell, finished, tally, sleep,
-            done=set(fates(target, tell)),
+            PutOff(pace.every_s, settling.now_s, tell), done=set(fates(target, tell)),
         )  # fmt: skip
         is_first = True
         while True:
@@ -176,10 +137,9 @@ class _Rounds:
     finished: Callable[[Finished], None]
     tally: Tally
     sleep: Callable[[float], None]
+    put_off: PutOff
     done: set[str]
     told: dict[str, str] = field(default_factory=dict)
-    tried: dict[str, int] = field(default_factory=dict)
-    not_before_s: dict[str, float] = field(default_factory=dict)
 
     def looked(self, find: Callable[[], Sequence[LogSource]], *, is_first: bool) -> Looked | None:
         """What is whole now; None while nothing can be listed."""
@@ -199,10 +159,8 @@ class _Rounds:
             w for w in self.told if w.startswith("lacks ") and w[6:] not in looked.lacking
         ]:
             del self.told[what]
-        there = {source.log for source in sources}
-        for log in [log for log in self.tried if log not in there]:
-            self._forget(log)
-        self.tally.lacking |= {log: self.told[_PUT_OFF + log] for log in self.tried}
+        self.put_off.keep_only({source.log for source in sources})
+        self.tally.lacking |= self.put_off.reasons
         return looked
 
     def play(self, looked: Looked, *, is_first: bool) -> bool:
@@ -212,7 +170,7 @@ class _Rounds:
         for source in looked.ready:
             if len(todo) == self.pace.per_round:
                 break
-            if self.not_before_s.get(source.log, 0.0) > self.settling.now_s():
+            if not self.put_off.is_due(source.log):
                 continue
             try:
                 task = self.task_of(source)
@@ -283,27 +241,20 @@ class _Rounds:
         self._forget(source.log)
         if not is_other:
             self.settling.take(source)
-        one = _finished(self.target, result)
+        one = finished_of(self.target, result)
         self.tally.finished += 1
         self.tally.failed += one.has_failed
         self.tally.gate_failed += one.gate == "failed"
         self.finished(one)
 
     def _put_off(self, source: LogSource, why: str) -> None:
-        """Try a log again, later each time."""
-        times = self.tried[source.log] = self.tried.get(source.log, 0) + 1
-        wait_s = min(self.pace.every_s * 2.0 ** min(times - 1, 30), _LONGEST_S)
-        self.not_before_s[source.log] = self.settling.now_s() + wait_s
+        self.put_off.put_off(source.log, why)
         self.tally.lacking[source.log] = why
-        if self.told.get(_PUT_OFF + source.log) != why:
-            self.told[_PUT_OFF + source.log] = why
-            self.tell(f"{source.log}: {why}; trying it again later")
 
     def _forget(self, log: str) -> None:
-        """That it was put off; of what came and went in a year nothing is left."""
-        for about in (self.tried, self.not_before_s, self.tally.lacking):
-            about.pop(log, None)
-        self.told.pop(_PUT_OFF + log, None)
+        """That it was put off."""
+        self.put_off.forget(log)
+        self.tally.lacking.pop(log, None)
 
     def _tell(self, what: str, line: str) -> None:
         """Tell what hinders once, and that it no longer does; an empty line: it does not."""
@@ -313,24 +264,6 @@ class _Rounds:
         elif line and self.told.get(what) != line:
             self.told[what] = line
             self.tell(line)
-
-
-def is_passing(line: str) -> bool:
-    """Whether a failed log may well be read another time, by the line that says why it failed."""
-    return any(lack in line for lack in _PASSING)
-
-
-def _finished(target: Path, result: LogResult) -> Finished:
-    (row,) = result.tables["logs"].to_pylist()
-    return Finished(
-        log=row["log"],
-        key=result.key,
-        state=row["state"],
-        summary=row["summary"] if result.error is None else result.error,
-        gate=row["gate"],
-        report=None if row["report"] is None else target / row["report"],
-        has_failed=result.error is not None,
-    )
 
 
 @contextmanager

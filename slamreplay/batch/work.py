@@ -64,8 +64,9 @@ class Work:
         return False
 
     def give_back(self) -> None:
-        """What is out waits again, before the others, for nobody knows of it any more."""
-        for task in reversed(self._out.values()):
-            waits = self._suspects if task.key in self.deaths else self._waiting
-            waits.appendleft(task)
+        """What is out waits again, before the others, for nobody knows of it any more.
+
+        A suspect that was out was alone: nothing waits beside it, and alone it goes out again.
+        """
+        self._waiting.extendleft(reversed(self._out.values()))
         self._out.clear()

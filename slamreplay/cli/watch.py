@@ -28,8 +28,9 @@ from slamreplay.cli.terminal import complain, say_json
 from slamreplay.errors import LogError, UsageError
 
 if TYPE_CHECKING:
+    from slamreplay.batch.finished import Finished
     from slamreplay.batch.task import LogSource
-    from slamreplay.batch.watch import Finished, Tally
+    from slamreplay.batch.watch import Tally
 
 _FAILED, _UNREADABLE = 1, 2
 #: So many logs are done between two looks, or so many of each worker where those are more: at the

@@ -69,8 +69,6 @@ def _record(content: bytes) -> tuple[str, dict[str, str]]:
     (length,) = struct.unpack_from("<I", content, at)
     at += 4
     end = at + length
-    if end > len(content):
-        raise ValueError("a map is longer than its record")
     found = {}
     while at < end:
         key, at = m.text(content, at)
