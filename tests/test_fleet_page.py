@@ -507,6 +507,14 @@ def test_outlines_cover_each_place_once_in_its_class(found):
     assert covered == expected
 
 
+def test_the_highest_places_alone_are_told_one_by_one():
+    blocks = blocks_of(np.arange(100), np.zeros(100))
+    value = np.arange(1.0, 101.0)
+    drawn = heat(blocks, value, bounds=(9, 19, 29, 39), classes="abcde", texts=[""] * 100)
+
+    assert [spot.x for spot in drawn.spots] == list(range(99, 39, -1))
+
+
 def test_too_many_places_are_drawn_in_blocks_that_keep_sums_and_greatest():
     col, row = (axis.ravel() for axis in np.meshgrid(np.arange(-50, 50), np.arange(80)))
     blocks = blocks_of(col, row)
