@@ -112,6 +112,11 @@ def test_nothing_runs_loads_or_is_styled_but_what_the_policy_names(page):
     assert not page.all("link", "iframe", "object")
 
 
+def test_numbers_keep_their_units_and_paper_says_what_it_is(page):
+    assert re.search("\\d\N{NO-BREAK SPACE}m²", page.text)
+    assert '@top-left{content:"slamreplay fleet"' in page.text
+
+
 def test_the_same_tables_give_the_same_bytes(folder, page):
     write_fleet_page(folder)
 
